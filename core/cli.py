@@ -12,14 +12,15 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, redirect_stdout
 from errno import EINVAL
 from importlib import import_module
 from pathlib import Path
 from traceback import extract_tb
+from typing import Any, TextIO
 
 from .children import end_with_parent_if_asked
-from .errors import InputError, RockfallError
+from .errors import InputError, RockfallError, visible
 from .interrupts import Interrupt, handled, interrupt, never_lost
 from .output import complete
 
@@ -97,7 +98,7 @@ def _run(argv: Sequence[str]) -> int:
     try:
         _check_characters(argv)
         arguments = _parser(argv).parse_args(argv)
-        with _blends(argv):
+        with redirect_stdout(VisibleStream(sys.stdout)), _blends(argv):
             status: int = arguments.run(arguments)
     except SystemExit as leaving:  # argparse has printed its help or its complaint
         return leaving.code if isinstance(leaving.code, int) else USAGE
@@ -134,6 +135,20 @@ def _check_characters(argv: Sequence[str]) -> None:
             raise InputError(
                 f"{word} has bytes that are no characters in UTF-8", advice="Rename it, or write it in other letters"
             ) from None
+
+
+class VisibleStream:
+    """A stream on which names from files cannot command the terminal, nor turn the letters of a line round."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+
+    def write(self, text: str) -> int:
+        """Write what of a text is to be seen."""
+        return self.stream.write(visible(text))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.stream, name)
 
 
 def _interrupted(error: KeyboardInterrupt) -> int:

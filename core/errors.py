@@ -15,6 +15,10 @@ UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\
 """Characters that a terminal would obey instead of showing them."""
 
 
+HIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ud800-\udfff\ufeff]")
+"""The same without tab and the ends of lines: what of a text nobody sees, or what turns its letters round (U+202E)."""
+
+
 class RockfallError(Exception):
     """Something that the user can put right."""
 
@@ -61,6 +65,11 @@ def _ended(text: str) -> str:
 
 class DependencyError(RockfallError):
     """A library or system component is missing; the message names the command that installs it."""
+
+
+def visible(text: str) -> str:
+    """A text to be shown, without characters that hide, or change the order of the others."""
+    return HIDDEN.sub("", text) if HIDDEN.search(text) else text
 
 
 def readable(text: str, most: int) -> str:

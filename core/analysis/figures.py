@@ -10,6 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..errors import visible
 from ..extras import FIGURES, demand
 from ..impact_models.registry import find_model
 from ..output import output_file
@@ -210,12 +211,23 @@ def save_figure(figure: "Figure", path: str | Path) -> None:
     """Write one figure; the file's ending says the format. The same figure makes the same file."""
     from matplotlib import rc_context
 
+    show_names(figure)
     if Path(path).suffix == ".png":
         _save_picture(_Painter().paint(figure), Path(path))
         return
     undated = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(Path(path).suffix, {})
     with rc_context(STYLE), lettered(figure), output_file(path) as draft:
         figure.savefig(draft, dpi=DPI, facecolor="white", metadata=undated)
+
+
+def show_names(figure: "Figure") -> None:
+    """Take out of all words of a figure what hides, or turns their letters round."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        if (seen := visible(text.get_text())) != text.get_text():
+            text.set_text(seen)
 
 
 class _Painter:
@@ -231,6 +243,7 @@ class _Painter:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from PIL import Image
 
+        show_names(figure)
         with rc_context(STYLE), lettered(figure):
             canvas = figure.canvas if isinstance(figure.canvas, FigureCanvasAgg) else FigureCanvasAgg(figure)
             moving = [one for axes in figure.axes for one in axes.get_children() if one.get_animated()]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..colours import scale_colours
+from ..errors import visible
 from ..reconstruction.impact import Impacts, fall_numbers
 from ..vectors import Array
 from .colouring import ONE_MODEL, Rgb, colour_by, group_colour, model_colours
@@ -73,7 +74,7 @@ def measured_columns(impacts: Impacts, predictions: Predictions) -> dict[str, An
     """Names, measured values (m_…) and further columns (c_…) of the compared impacts."""
     row = predictions.row
     columns: dict[str, Any] = {
-        "trajectory": predictions.trajectory.tolist(),
+        "trajectory": list(map(visible, predictions.trajectory.tolist())),
         "impact": predictions.impact.tolist(),
         "fall": fall_numbers(impacts)[row].astype(np.int32),
     }
@@ -82,7 +83,7 @@ def measured_columns(impacts: Impacts, predictions: Predictions) -> dict[str, An
     for name in column_titles([impacts]):
         if name not in VARIABLES:
             column = find_column(impacts, name)
-            values = column.texts[row].tolist() if column.texts is not None else column.numbers
+            values = list(map(visible, column.texts[row].tolist())) if column.texts is not None else column.numbers
             columns[f"c_{name}"] = values if isinstance(values, list) or values is None else _single(values[row])
     return columns
 
@@ -102,12 +103,12 @@ def chosen_columns(impacts: Impacts, predictions: Predictions) -> list[dict[str,
 
     Names, titles and keys in the table of points; the groups of texts, or the ends of the scale of numbers.
     """
-    found = []
+    found: list[dict[str, Any]] = []
     for name, title in column_titles([impacts]).items():
         column = find_column(impacts, name)
         key = f"m_{name}" if name in VARIABLES else f"c_{name}"
         if column.texts is not None:
-            groups = list(dict.fromkeys(column.texts[predictions.row].tolist()))
+            groups = list(dict.fromkeys(map(visible, column.texts[predictions.row].tolist())))
             if len(groups) > 1:
                 found.append({"name": name, "title": title, "key": key, "groups": groups})
         elif column.numbers is not None:

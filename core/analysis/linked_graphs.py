@@ -57,6 +57,13 @@ select.bk-input {{
 }}
 .score, .beyond {{ color: var(--muted); }}
 """
+UPDATE = "update"
+"""Name of the only callback, whose text stands in the page: a text that is compiled later needs a page that allows to
+run any text (`unsafe-eval`)."""
+UPDATE_NEEDS = (
+    "source", "passing", "graphs", "variables", "pairs", "models", "columns", "palettes", "looks", "students", "begin",
+    "edited", "other", "selection",
+)  # fmt: skip
 TOOLTIP = """
 <div style="font: 12px/1.5 {font}; color: {ink}">
 <b>@trajectory, impact @impact</b>
@@ -146,7 +153,7 @@ def link_graphs(
             "other": None if other_run is None else of_run(other_run),
             "selection": selection,
         },
-        code="\n".join((WEB / name).read_text(encoding="utf-8") for name in ("fits.js", "graphs.js")),
+        code=UPDATE,
     )
     source.js_on_change("data", update)
     source.selected.js_on_change("indices", update)
@@ -168,6 +175,12 @@ def link_graphs(
         for spec, block in zip(specs, blocks, strict=True)
     }
     return LinkedGraphs(graphs, source, selection)
+
+
+def update_script() -> str:
+    """What the page does when data, menus or the selection change, as JavaScript; see assets/report/page.html."""
+    code = "\n".join((WEB / name).read_text(encoding="utf-8") for name in ("fits.js", "graphs.js"))
+    return f"({{ {', '.join(UPDATE_NEEDS)} }}) => {{\n{code}\n}}"
 
 
 def _described(name: str, colour: str) -> dict[str, str]:

@@ -10,13 +10,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from ..errors import visible
 from ..extras import PAGES, demand
 from ..impact_models.registry import find_model
 from ..output import write_text
 from ..reconstruction.impact import Impacts
 from .comparison import Predictions, thinned
 from .linked_columns import symbol_html
-from .linked_graphs import WEB, link_graphs
+from .linked_graphs import WEB, link_graphs, update_script
 from .scores import Score
 from .variables import VARIABLES
 
@@ -57,6 +58,7 @@ def write_report(
     predictions = thinned(predictions, MOST_SHOWN)
     linked = link_graphs(impacts, predictions, run, [first], other_run=0 if run else None)
     document = Document()
+    title, origin = visible(title), visible(origin)
     document.title = title or f"Rockfall: {origin or 'impact models'}"
     with document.models.freeze():  # what belongs to the page is looked up once, not with each root
         for root in (*linked.graphs.values(), linked.selection):
@@ -94,6 +96,7 @@ def frame(graphs: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "style": (WEB / "page.css").read_text(encoding="utf-8"),
         "graphs": [graph.name for graph in graphs.values()],
+        "update": update_script(),
     }
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from math import cos, pi, sin
 from xml.sax.saxutils import escape
 
+from ..errors import visible
 from ..vectors import Array
 from .graph_layout import Rectangle
 
@@ -78,7 +79,7 @@ class Svg:
         if upright:
             place = f'transform="translate({_n(x + down)} {_n(self.height - y)}) rotate(-90)"'
         look = f'font-size="{_n(size)}" text-anchor="{where}" {_paint("fill", colour)}'
-        self._parts.append(f"<text {place} {look}>{escape(words)}</text>")
+        self._parts.append(f"<text {place} {look}>{escape(visible(words))}</text>")
 
     def document(self) -> str:
         """The file's text."""

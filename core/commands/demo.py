@@ -2,13 +2,13 @@
 """``rockfall demo``: the whole job on the bundled site, from timed picks to tables, a picture and a film."""
 
 import argparse
-import csv
 import textwrap
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..film.engines import ENGINES
+from ..formats.csv_cells import CellWriter
 from ..output import output_stream
 from ..reconstruction.sampling import STEP_S
 from .progress import PrintedProgress
@@ -95,7 +95,7 @@ def _write_tables(result: "Reconstruction", surface: "Surface | None", folder: P
 
 def _write(path: Path, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
     with output_stream(path) as file:
-        writer = csv.writer(file, lineterminator="\n")
+        writer = CellWriter(file)
         writer.writerow(columns)
         writer.writerows(rows)
 

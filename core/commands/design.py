@@ -39,8 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="lines across the slope, GeoJSON, a GeoPackage or a table; with the properties height_m and capacity_kJ a "
-        "barrier that stands there (a project can state its own: [[simulation.screens]])",
+        help="lines across the slope or areas, a shapefile, KML, GeoJSON, a GeoPackage or a table; with the "
+        "properties height_m and capacity_kJ a barrier that stands there (a project can state its own: "
+        "[[simulation.screens]])",
     )
     parser.add_argument(
         "--factors",
@@ -130,9 +131,10 @@ def run(arguments: argparse.Namespace) -> int:
         fixed = arguments.number is not None or not arguments.until_known
         if project.picks is not None and len(read_project_picks(project, None)[0]):
             measured = reconstruct_project(project, ground.surface)
+        placed = scenario.releases(ground) if fixed else as_many_as(scenario, ground, arguments.most or MOST_BLOCKS)
         sheet = design_sheet(
             ground,
-            scenario.releases(ground) if fixed else as_many_as(scenario, ground, arguments.most or MOST_BLOCKS),
+            placed,
             scenario.settings,
             screens,
             factors,
@@ -150,7 +152,7 @@ def run(arguments: argparse.Namespace) -> int:
         written = write_design(sheet, folder, inputs, pdf=not arguments.no_pdf, progress=progress)
         tallies = {one.settings.model: one.tally for one in sheet.models}
         write_screens(tallies, folder / "screens.csv", {one.settings.model: one.values for one in sheet.models})
-    for remark in sheet.remarks:
+    for remark in (*sheet.remarks, *placed.remarks):
         print(remark)
     for one in sheet.models:
         for name, values in one.values.items():

@@ -2,11 +2,11 @@
 """``rockfall merge``: impact tables of several sites → one table with its sources."""
 
 import argparse
-import csv
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
+from ..formats.csv_cells import CellWriter
 from ..output import output_stream
 from .options import add_out, add_site_option, add_where_option, for_each, tables_as_asked
 from .progress import PrintedProgress
@@ -92,9 +92,9 @@ def _write_duplicates(merged: "Merged", path: Path) -> None:
 
 def _write_rows(rows: list[dict[str, object]], path: Path) -> None:
     with output_stream(path) as stream:
-        writer = csv.DictWriter(stream, rows[0], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+        writer = CellWriter(stream)
+        writer.writerow(rows[0])
+        writer.writerows(row.values() for row in rows)
 
 
 def _summary(merged: "Merged", database: "Database", duplicates: str) -> list[str]:

@@ -28,13 +28,14 @@ def add_release_options(parser: argparse.ArgumentParser) -> None:
     source.add_argument(
         "--from-line",
         metavar="FILE",
-        help="anywhere along lines: GeoJSON, a GeoPackage, or a table name, x_m, y_m, z_m",
+        help="anywhere along lines: a shapefile, KML, GeoJSON, a GeoPackage, or a table name, x_m, y_m, z_m",
     )
     source.add_argument("--evenly", action="store_true", help="evenly along the lines, not at random")
     source.add_argument(
         "--from-polygon",
         metavar="FILE",
-        help="within polygons of a map, as many on each square metre of the terrain itself: GeoJSON, or a table",
+        help="within polygons of a map, as many on each square metre of the terrain itself: a shapefile, KML, GeoJSON, "
+        "a GeoPackage, or a table of corners",
     )
     source.add_argument(
         "--steeper-than",
@@ -87,8 +88,8 @@ def add_zone_options(parser: argparse.ArgumentParser) -> None:
     zones.add_argument(
         "--zones",
         metavar="FILE",
-        help="polygons with a name and parameters as properties: friction, PARAMETER or MODEL.PARAMETER; GeoJSON, or a "
-        "table of corners name, x_m, y_m with a column for each parameter",
+        help="polygons with a name and parameters as properties: friction, PARAMETER or MODEL.PARAMETER; a "
+        "shapefile, KML, GeoJSON, a GeoPackage, or a table of corners name, x_m, y_m with a column for each parameter",
     )
     zones.add_argument(
         "--zone-attribute",
@@ -217,7 +218,7 @@ def _from_line(arguments: argparse.Namespace, ground: "Ground", blocks: "Blocks"
 
     lines = read_lines(arguments.from_line, ground.shift)
     with naming(arguments.from_line):
-        return on_line(
+        placed = on_line(
             ground,
             [line.parts[0] for line in lines],
             blocks,
@@ -226,6 +227,7 @@ def _from_line(arguments: argparse.Namespace, ground: "Ground", blocks: "Blocks"
             evenly=arguments.evenly,
             names=[line.name for line in lines],
         )
+    return placed.with_remarks(*lines.remarks)
 
 
 def _from_area(arguments: argparse.Namespace, ground: "Ground", blocks: "Blocks", number: int, seed: int) -> "Releases":
@@ -241,7 +243,8 @@ def _from_area(arguments: argparse.Namespace, ground: "Ground", blocks: "Blocks"
     shapes = read_polygons(arguments.from_polygon, ground.shift)
     polygons = [polygon_of(shape, arguments.from_polygon) for shape in shapes]
     with naming(arguments.from_polygon):
-        return in_polygon(ground, polygons, blocks, number, seed, steeper_than=angle)
+        placed = in_polygon(ground, polygons, blocks, number, seed, steeper_than=angle)
+    return placed.with_remarks(*shapes.remarks)
 
 
 def _from_impacts(

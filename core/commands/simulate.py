@@ -72,8 +72,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="lines across the slope, GeoJSON, a GeoPackage or a table of points: what passes there; with the "
-        "properties height_m and capacity_kJ a barrier, and what it holds",
+        help="lines across the slope or areas, a shapefile, KML, GeoJSON, a GeoPackage or a table: what passes "
+        "there; with the properties height_m and capacity_kJ a barrier, and what it holds",
     )
     motion.add_argument(
         "--contact",
@@ -188,12 +188,13 @@ def _remarks(mapped: "Mapped", work: Work) -> "list[Remark]":
     """What there is to say of them."""
     from ..workflow.enough import enough_remarks
     from ..workflow.maps import map_remarks
-    from ..workflow.screens import screen_remarks
+    from ..workflow.screens import outside_remarks, screen_remarks
     from ..workflow.simulation import remarks_of
 
     said = [
         *remarks_of(mapped.simulations, list(work.scenario.models)),
         *map_remarks(mapped.cells),
+        *outside_remarks(work.screens, work.ground),
         *screen_remarks(mapped.screens),
     ]
     if work.until_known is not None:

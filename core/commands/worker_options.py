@@ -78,7 +78,7 @@ def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path,
     from ..remarks import gravest_first
     from ..workflow.dask_pool import DaskPool
     from ..workflow.maps import map_remarks
-    from ..workflow.screens import screen_remarks
+    from ..workflow.screens import outside_remarks, screen_remarks
     from ..workflow.simulation import check_models, remarks_of
 
     scenario = work.scenario
@@ -105,6 +105,7 @@ def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path,
         said = (
             *remarks_of(simulations, list(scenario.models)),
             *map_remarks(mapped.cells),
+            *outside_remarks(work.screens, work.ground),
             *screen_remarks(mapped.screens),
             *(remark for store in stores for remark in store.remarks),
         )

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """calibration.csv, equivalent.csv, and holdout.csv."""
 
-import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ..analysis.calibration import Fold
 from ..analysis.estimation import Estimate
+from ..formats.csv_cells import CellWriter
 from ..output import output_stream
 
 ESTIMATES_COLUMNS = ("model", "parameter", "unit", "default", "fitted", "low", "high", "verdict")
@@ -29,7 +29,7 @@ def write_folds(folds: Sequence[Fold], path: str | Path) -> None:
 
 def _write(path: str | Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     with output_stream(path) as stream:
-        writer = csv.writer(stream, lineterminator="\n")
+        writer = CellWriter(stream)
         writer.writerow(columns)
         writer.writerows(rows)
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """predictions.csv, scores.csv, and comparison.toml with what they were computed with."""
 
-import csv
 from dataclasses import astuple, fields
 from math import prod
 from pathlib import Path
@@ -12,6 +11,7 @@ import tomli_w
 from ..analysis.comparison import Predictions
 from ..analysis.scores import Score
 from ..errors import InputError
+from ..formats.csv_cells import CellWriter
 from ..output import output_stream, write_text
 from ..reading import reader
 from ..reconstruction.impact import RUN, Impacts
@@ -89,7 +89,7 @@ def read_predictions(path: str | Path, impacts: Impacts) -> Predictions:
 def write_scores(scores: tuple[Score, ...], path: str | Path) -> None:
     """Write scores.csv."""
     with output_stream(path) as stream:
-        writer = csv.writer(stream, lineterminator="\n")
+        writer = CellWriter(stream)
         writer.writerow(field.name for field in fields(Score))
         for score in scores:
             writer.writerow("" if value != value else value for value in astuple(score))

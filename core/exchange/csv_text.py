@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, readable
+from ..formats.csv_cells import unguarded
 from ..formats.number_words import (
     GROUP_SIGNS,
     as_utf8,
@@ -67,8 +68,10 @@ class TextTable:
     def cells(self, name: str) -> list[str]:
         """(n,) of a column that is there, without surrounding blanks."""
         if isinstance(self.columns, Cells):
-            return self.columns.texts(name)
-        return [cell for block in self.columns[name] for cell in block.split(BETWEEN)]
+            cells = self.columns.texts(name)
+        else:
+            cells = [cell for block in self.columns[name] for cell in block.split(BETWEEN)]
+        return cells if self.source.suffix.lower() == SUFFIX else [unguarded(cell) for cell in cells]
 
     def text(self, name: str, default: str = "") -> list[str]:
         """(n,) cells; `default` where the column is missing or the cell is empty."""
@@ -204,6 +207,7 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
             if not any(stripped):
                 pass
             elif not header:
+                stripped = [unguarded(name) for name in stripped]
                 top, blocks = start, [[] for _ in stripped]
                 header, converted = _in_our_units(path, stripped, known, start)
                 _check_header(path, header, required, known, start)
@@ -234,7 +238,7 @@ def read_table(path: str | Path, required: Sequence[str], known: Sequence[str]) 
 
 
 def _plain_table(path: Path, rows: PlainRows, required: Sequence[str], known: Sequence[str]) -> TextTable:
-    header, converted = _in_our_units(path, list(rows.header), known, 1)
+    header, converted = _in_our_units(path, [unguarded(name) for name in rows.header], known, 1)
     _check_header(path, header, required, known, 1)
     cells = PlainCells(rows, header, BLOCK_ROWS, BETWEEN)
     return _in_known_units(TextTable(path, cells, range(2, len(rows.begins) + 1), converted), header, known, 1)

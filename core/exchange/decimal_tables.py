@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Large tables, written with fixed decimals: their parts become text on all cores, in the order of the rows."""
 
-import csv
 import io
 import os
 import re
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..formats.csv_cells import CellWriter, guarded
 from ..output import output_stream
 from ..progress import Progress, silent
 from ..vectors import Array, Indices
@@ -97,7 +97,7 @@ def _text(
         if isinstance(cells, Words):
             table[j] = cells.which
             table[j] += len(words)
-            texts = [(_line((text,))[:-1] if QUOTED.search(text) else text).encode() for text in cells.texts]
+            texts = [(_line((text,))[:-1] if QUOTED.search(text) else guarded(text)).encode() for text in cells.texts]
             words += texts
             width += 1 + max(map(len, texts), default=0)
         else:
@@ -114,7 +114,7 @@ def _text(
 
 def _with_all_digits(columns: DecimalColumns, rows: int) -> bytes:
     stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
+    writer = CellWriter(stream)
     for i in range(rows):
         row = []
         for cells in columns.values():
@@ -127,5 +127,5 @@ def _with_all_digits(columns: DecimalColumns, rows: int) -> bytes:
 def _line(texts: Iterable[str]) -> str:
     """A row, quoted where it must be."""
     stream = io.StringIO()
-    csv.writer(stream, lineterminator="\n").writerow(texts)
+    CellWriter(stream).writerow(texts)
     return stream.getvalue()

@@ -21,6 +21,7 @@ from ..analysis.likelihood_free import weighted_quantiles
 from ..analysis.scores import Score
 from ..analysis.typefaces import lettered
 from ..analysis.variables import find_variable
+from ..errors import visible
 from ..hazard.design import KNOWN_TO, LEVELS_KJ, ON, DesignValues, Factor
 from ..hazard.screens import OUTCOMES, Screen
 from ..impact_models.registry import find_model
@@ -82,7 +83,7 @@ def write_design(
     for name, caption, figure in figures_of(sheet) if drawn else ():
         progress(f"Drawing {name}", 0, 0)
         figures.append((name, caption, figure))
-    write_text(folder / "design.html", page(sheet, tables, facts, figures))
+    write_text(folder / "design.html", visible(page(sheet, tables, facts, figures)))
     written = ["design.html"]
     if pdf and drawn:
         progress("Writing the PDF", 0, 0)
@@ -410,7 +411,10 @@ def _html(table: Table) -> str:
 def _picture(figure: "Figure") -> str:
     from matplotlib import rc_context
 
+    from ..analysis.figures import show_names
+
     buffer = io.BytesIO()
+    show_names(figure)
     with rc_context(STYLE), lettered(figure):
         figure.savefig(buffer, format="png", dpi=DPI)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..analysis.figures import INK, MUTED, STYLE
 from ..analysis.typefaces import FAMILIES, families_for, lettered, quiet
+from ..errors import visible
 from ..output import output_file
 
 if TYPE_CHECKING:
@@ -98,6 +99,7 @@ def write_pdf(elements: Sequence[Element], path: Path, title: str) -> None:
     from matplotlib.backends.backend_pdf import PdfPages
     from matplotlib.figure import Figure
 
+    title = visible(title)
     with output_file(path) as part, rc_context(STYLE), PdfPages(part, metadata={"Title": title}) as pdf:
         with quiet():
             pages = lay_out(elements, measured_by_font())
@@ -220,7 +222,7 @@ def _columns(table: Rows, measure: Measure) -> list[float]:
 def _wrapped(text: str, kind: str, width: float, measure: Measure) -> list[str]:
     """Lines no wider than that; words that are wider are cut."""
     lines = list[str]()
-    for word in text.split():
+    for word in visible(text).split():
         pieces = list(_pieces(word, kind, width, measure))
         longer = f"{lines[-1]} {word}" if lines else word
         if len(pieces) == 1 and lines and measure(longer, kind) <= width:

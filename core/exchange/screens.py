@@ -1,31 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Screens and barriers from lines of a map, and screens.csv: what is known of them.
+"""Screens and barriers from lines and areas of a map, and screens.csv: what is known of them.
 
-Properties of a line, or further columns of a table of points, are ``height_m`` and ``capacity_kJ``: with both it is a
-barrier, which holds blocks; else it measures.
+An area is a screen along its outline. Properties of a line or area, or further columns of a table of points, are
+``height_m`` and ``capacity_kJ``: with both it is a barrier, which holds blocks; else it measures.
 """
 
-import csv
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
+from ..formats.csv_cells import CellWriter
 from ..georeference import GlobalShift
 from ..hazard.design import DesignValues, design_of
 from ..hazard.screen_tally import Known, ScreenFigures, ScreenTally
 from ..hazard.screens import OUTCOMES, Screen
 from ..output import output_stream
 from ..reading import reader
-from .map_shapes import GEOJSON, GEOPACKAGE, MapShape, read_lines, read_polygons
+from ..vectors import Array
+from .map_shapes import MapShape, read_shapes
 from .simulation_entry import ScreenEntry
+from .zones import SHAPEFILE_LETTERS
 
 HEIGHT, CAPACITY = "height_m", "capacity_kJ"
-AREAS = (*GEOJSON, *GEOPACKAGE)
-"""Files that may have polygons."""
 COLUMNS = (
     "screen", "model", "barriers", "height_m", "capacity_kJ", "length_m", "blocks", "reach", "share", "hits",
     *OUTCOMES[1:], "quantity", "unit", "mean", "median", "q95", "q95_low", "q95_high", "q99", "q99_low", "q99_high",
@@ -37,15 +36,14 @@ QUANTITIES = (("speed", "m/s", "speed_mps", 1.0), ("energy", "kJ", "energy_j", 1
 
 @reader("map of screens")
 def read_screens(path: str | Path, shift: GlobalShift) -> tuple[Screen, ...]:
-    """The lines of a file as screens, and the outlines of its polygons; those without a name have the file's.
+    """The lines of a file, and the outlines of its areas, as screens; those without a name have the file's.
 
     Raises
     ------
-    InputError : see `read_lines` and `Screen`; a polygon with a hole, a capacity without a height, a value that is no
-        number.
+    InputError : see `read_shapes` and `Screen`; an area with a hole, a capacity without a height, a value that
+        is no number.
     """
-    path = Path(path)
-    shapes = _lines_of(path, shift)
+    path, shapes = Path(path), read_shapes(path, shift)
     found = []
     for number, shape in enumerate(shapes, start=1):
         name = shape.name or (path.stem if len(shapes) == 1 else f"{path.stem} {number}")
@@ -56,32 +54,10 @@ def read_screens(path: str | Path, shift: GlobalShift) -> tuple[Screen, ...]:
                 raise InputError(f"Barrier {name!r} has a capacity and no height", advice=f"Give it {HEIGHT} as well")
             height_m = np.inf if height is None else height
             capacity_j = None if capacity is None else 1000 * capacity
-            found.append(Screen(name, np.ascontiguousarray(shape.parts[0][:, :2]), height_m, capacity_j))
+            found.append(Screen(name, _line_of(shape, name), height_m, capacity_j, shapes.remarks))
         except InputError as error:
             raise InputError(error.problem, file=path, advice=error.advice) from error
     return tuple(found)
-
-
-def _lines_of(path: Path, shift: GlobalShift) -> tuple[MapShape, ...]:
-    """The lines of a file; of one with polygons their outlines, closed."""
-    try:
-        return read_lines(path, shift)
-    except InputError as error:
-        if path.suffix.lower() not in AREAS:
-            raise
-        try:
-            polygons = read_polygons(path, shift)
-        except InputError:
-            raise error from None
-    for number, shape in enumerate(polygons, start=1):
-        if len(shape.parts) > 1:
-            raise InputError(
-                f"The polygon {shape.name or number} has a hole, and a screen is one line",
-                file=path,
-                advice="Give its outline alone, or the hole as a polygon of its own",
-            )
-    closed = (np.vstack([shape.parts[0], shape.parts[0][:1]]) for shape in polygons)
-    return tuple(replace(shape, parts=(line,)) for shape, line in zip(polygons, closed, strict=True))
 
 
 def screens_of(entries: Sequence[ScreenEntry], shift: GlobalShift) -> tuple[Screen, ...]:
@@ -128,7 +104,7 @@ def write_screens(
     if values is None:
         values = {model: design_of(tally) for model, tally in tallies.items()}
     with output_stream(path) as stream:
-        writer = csv.writer(stream, lineterminator="\n")
+        writer = CellWriter(stream)
         writer.writerow(COLUMNS)
         for model, tally in tallies.items():
             for barriers in (False, True) if any(screen.holds for screen in tally.screens) else (False,):
@@ -167,8 +143,18 @@ def _verdict(values: DesignValues | None) -> list[object]:
     return [values.factors.title, values.verdict, "" if more is None else more.blocks]
 
 
+def _line_of(shape: MapShape, name: str) -> Array:
+    """(k, 2) of a line; of an area its outline, closed."""
+    if len(shape.parts) > 1:
+        raise InputError(
+            f"The area of screen {name!r} has holes", advice="Give each outline as an area, or a line, of its own"
+        )
+    line = shape.parts[0][:, :2]
+    return np.ascontiguousarray(line if shape.kind == "line" else np.vstack([line, line[:1]]))
+
+
 def _number(shape: MapShape, name: str, key: str, path: Path) -> float | None:
-    value = shape.properties.get(key)
+    value = shape.properties.get(key, shape.properties.get(key[:SHAPEFILE_LETTERS]))
     if value is None or value == "":
         return None
     try:
@@ -182,7 +168,7 @@ def _refuse_nearly(shape: MapShape, name: str, path: Path) -> None:
     ours = {HEIGHT.lower(): HEIGHT, CAPACITY.lower(): CAPACITY}
     for key in shape.properties:
         near = get_close_matches(key.lower(), ours, n=1, cutoff=0.75)
-        if near and key not in (HEIGHT, CAPACITY):
+        if near and key not in (HEIGHT, CAPACITY, CAPACITY[:SHAPEFILE_LETTERS]):
             raise InputError(
                 f"Screen {name!r} has {key}",
                 file=path,

@@ -84,7 +84,7 @@ class ReleaseEntry:
     source : one of `SOURCES`: what the project has measured, the rows of a table, points, anywhere on a line, in a
         polygon, or on terrain steeper than an angle.
     trajectory, time_s : of what was measured only this trajectory, from the pick at this time on.
-    file : releases.csv, for a table.
+    file : releases.csv, for a table; a map of lines or polygons in place of their points, see `exchange.map_shapes`.
     points_m : for points, a line and a polygon: survey coordinates, with or without z [m]; without it on the terrain.
     steeper_than_deg : for steep terrain.
     name : of the releases from points, a line or a polygon.
@@ -329,8 +329,11 @@ def _read_releases(table: TomlTable) -> ReleaseEntry:
     source = table.choice("from", SOURCES, MEASURED)
     if source == TABLE and not table.has("file"):
         raise table.wrong("file", "is missing", 'Name the table of releases: file = "releases.csv"')
+    of_map = source in (LINE, POLYGON) and table.has("file")
+    if of_map and table.has("points_m"):
+        raise table.wrong("points_m", "is given beside file", "The map has the points: leave out one of them")
     points = table.points("points_m")
-    least = LEAST_POINTS.get(source, 0)
+    least = 0 if of_map else LEAST_POINTS.get(source, 0)
     if len(points) < least:
         raise table.wrong("points_m", f"has {len(points)} points", f"A source {source!r} needs at least {least}")
     angle = table.number("steeper_than_deg", STEEPER_THAN_DEG, zero_allowed=True)

@@ -29,12 +29,13 @@ from ..terrain.readers import read_structure, read_tile_points
 from ..terrain.surface import Surface
 from ..workflow.simulation import ReleaseSource, Scenario
 from .footage import measured_in
+from .map_shapes import polygon_of, read_lines, read_polygons
 from .opening import open_terrain, read_project_picks, reconstruct_project
 from .parameters import checked_parameters
 from .posterior_tables import posteriors_of
 from .project import BlockEntry, Project
 from .screens import screens_of
-from .simulation_entry import LINE, MEASURED, POINTS, STEEP, TABLE, ReleaseEntry, SimulationEntry
+from .simulation_entry import LINE, MEASURED, POINTS, POLYGON, STEEP, TABLE, ReleaseEntry, SimulationEntry
 from .simulation_output import recorded_for
 from .simulation_tables import read_releases
 from .tables import read_impacts
@@ -75,7 +76,7 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         inputs["observed"] = entry.observed
     if project.picks is not None and (entry.releases.source == MEASURED or (drawing and entry.observed is None)):
         inputs["picks"] = project.picks
-    if entry.releases.source == TABLE and entry.releases.file is not None:
+    if entry.releases.source in (TABLE, LINE, POLYGON) and entry.releases.file is not None:
         inputs["releases"] = entry.releases.file
     draws = {}
     if entry.posterior is not None:
@@ -215,7 +216,9 @@ def _measured(project: Project, terrain: Surface, entry: ReleaseEntry) -> Recons
 
 
 def _from_drawing(ground: Ground, entry: ReleaseEntry, blocks: Blocks, seed: int) -> Releases:
-    """From points, a line or a polygon."""
+    """From points, lines or polygons."""
+    if entry.file is not None and entry.source != POINTS:
+        return _from_map(ground, entry, entry.file, blocks, seed)
     survey = np.array([[*point, np.nan][:3] for point in entry.points_m])
     points = ground.shift.to_local(survey)
     if entry.source == POINTS:
@@ -225,6 +228,20 @@ def _from_drawing(ground: Ground, entry: ReleaseEntry, blocks: Blocks, seed: int
     if entry.source == LINE:
         return on_line(ground, [points], blocks, entry.number, seed, names=[entry.name])
     return in_polygon(ground, [Polygon(entry.name, (points[:, :2],))], blocks, entry.number, seed)
+
+
+def _from_map(ground: Ground, entry: ReleaseEntry, file: Path, blocks: Blocks, seed: int) -> Releases:
+    """From the lines or polygons of a file; those without a name have the entry's."""
+    with _naming(file):
+        if entry.source == LINE:
+            shapes = read_lines(file, ground.shift)
+            names = [shape.name or entry.name for shape in shapes]
+            placed = on_line(ground, [shape.parts[0] for shape in shapes], blocks, entry.number, seed, names=names)
+        else:
+            shapes = read_polygons(file, ground.shift)
+            polygons = [polygon_of(replace(shape, name=shape.name or entry.name), file) for shape in shapes]
+            placed = in_polygon(ground, polygons, blocks, entry.number, seed)
+    return placed.with_remarks(*shapes.remarks)
 
 
 def _from_table(ground: Ground, entry: ReleaseEntry, blocks: Blocks, seed: int) -> Releases:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..analysis.likelihood_free import weighted_quantiles
 from ..errors import InputError
+from ..formats.shapefile import parts_beside
 from ..georeference import GlobalShift
 from ..hazard.screen_tally import ScreenTally
 from ..hazard.screens import HELD
@@ -381,8 +382,11 @@ def write_summary(values: dict[str, Any], path: str | Path) -> None:
 
 
 def inputs_with_digests(inputs: Mapping[str, Path]) -> dict[str, dict[str, str]]:
-    """The files that decided a result, by what they are."""
-    return {name: {"file": path.name, "sha256": _digest(path)} for name, path in inputs.items()}
+    """The files that decided a result, by what they are, and what belongs to them and stands beside them."""
+    files: dict[str, Path] = {}
+    for name, path in inputs.items():
+        files |= {name: path, **{f"{name}{suffix}": file for suffix, file in parts_beside(path).items()}}
+    return {name: {"file": path.name, "sha256": _digest(path)} for name, path in files.items()}
 
 
 def _digest(path: Path) -> str:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the statistics of impacts write: tables of all impacts and of their groups, and summary.json."""
 
-import csv
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -12,6 +11,7 @@ from typing import Any
 
 from ..analysis.group_statistics import GroupStatistics
 from ..analysis.statistics import ImpactStatistics
+from ..formats.csv_cells import CellWriter
 from ..output import output_stream, write_text
 from ..remarks import Remark, to_plain
 from .database import Source
@@ -106,7 +106,7 @@ def _write_summary(
 
 def _write(path: Path, header: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     with output_stream(path) as stream:
-        writer = csv.writer(stream, lineterminator="\n")
+        writer = CellWriter(stream)
         writer.writerow(header)
         writer.writerows([["" if cell != cell else cell for cell in row] for row in rows])
 

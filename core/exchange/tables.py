@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..formats.csv_cells import guarded
 from ..georeference import GlobalShift
 from ..output import output_stream
 from ..reading import reader
@@ -322,7 +323,9 @@ def _texts(cells: Cells) -> list[str]:
     """As they are written: the shortest text that reads back as the same number; empty when undefined."""
     if isinstance(cells, np.ndarray) and cells.dtype.kind == "f":
         return shortest_texts(cells)
-    return list(map(str, cells.tolist())) if isinstance(cells, np.ndarray) else list(cells)
+    if isinstance(cells, np.ndarray) and cells.dtype.kind != "U":
+        return list(map(str, cells.tolist()))
+    return [guarded(cell) for cell in (cells.tolist() if isinstance(cells, np.ndarray) else cells)]
 
 
 def _rounded(values: Array) -> list[str]:
@@ -349,7 +352,7 @@ def write_tables(path: str | Path, tables: Iterable[Columns]) -> None:
     with output_stream(path, binary=True) as stream:
         for i, columns in enumerate(tables):
             if i == 0:
-                stream.write(_quoted_rows([columns]))
+                stream.write(_quoted_rows([map(guarded, columns)]))
             for start in range(0, min(map(len, columns.values())), WRITTEN_ROWS):
                 cells = [values[start : start + WRITTEN_ROWS] for values in columns.values()]
                 if any(map(_must_be_quoted, cells)):

@@ -8,6 +8,7 @@
 fir of the same diameter. Heights and species that are missing are those of the whole forest.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from ..simulation.trees import SPECIES, THICKEST_M, Trees, factor_of, greatest_l
 from ..terrain.cloud import Cloud
 from ..terrain.surface import Surface
 from .csv_text import read_table
-from .map_shapes import GEOJSON, polygon_of, read_polygons
+from .map_shapes import SUFFIXES, polygon_of, read_polygons
 from .simulation_entry import TreesEntry
 from .tables import Columns, write_columns
 
@@ -48,15 +49,19 @@ def open_trees(entry: TreesEntry, terrain: Surface | Cloud, seed: int) -> tuple[
     if entry.stems_per_hectare is None or entry.dbh_cm is None:
         missing = "stems per hectare" if entry.stems_per_hectare is None else "diameter at breast height (dbh)"
         raise InputError(f"The trees have no {missing}", advice="Give both, or a table of trees")
-    among, files = [], {}
+    among, files, said = [], {}, tuple[str, ...]()
     if entry.within is not None:
-        among = [polygon_of(shape, entry.within) for shape in read_polygons(entry.within, terrain.shift)]
+        shapes = read_polygons(entry.within, terrain.shift)
+        among, said = [polygon_of(shape, entry.within) for shape in shapes], tuple(map(str, shapes.remarks))
         files["trees_within"] = entry.within
-    trees = random_trees(
-        terrain, entry.stems_per_hectare, CM * entry.dbh_cm, CM * entry.dbh_sd_cm, seed,
-        height_m=entry.height_m, factor=factor_of(entry.species), among=among,
-    )  # fmt: skip
-    return trees, files
+    try:
+        trees = random_trees(
+            terrain, entry.stems_per_hectare, CM * entry.dbh_cm, CM * entry.dbh_sd_cm, seed,
+            height_m=entry.height_m, factor=factor_of(entry.species), among=among,
+        )  # fmt: skip
+    except InputError as error:
+        raise InputError(error.problem, file=error.file or entry.within, advice=error.advice) from error
+    return replace(trees, left_out=(*said, *trees.left_out)), files
 
 
 @reader("table of trees")
@@ -71,7 +76,7 @@ def read_trees(path: str | Path, terrain: Surface | Cloud, height_m: float, spec
     ------
     InputError : anything that is wrong with the table, with the row; no tree on the terrain.
     """
-    if Path(path).suffix.lower() in GEOJSON:
+    if Path(path).suffix.lower() in SUFFIXES[:-1]:
         raise InputError(
             "Trees are read from a table, not from a map of points",
             file=path,

@@ -15,6 +15,7 @@ from ..simulation.release import Releases
 from ..workflow.simulation import ReleaseSource
 from ..workflow.whole_runs import ObservedRuns
 from .csv_text import read_table
+from .map_shapes import read_lines
 from .tables import Columns, write_columns, write_tables
 
 QUANTILE_NAMES = tuple(f"q{round(100 * part):02d}" for part in QUANTILES)
@@ -22,15 +23,17 @@ QUANTILE_NAMES = tuple(f"q{round(100 * part):02d}" for part in QUANTILES)
 
 @reader("table of a section")
 def read_section(path: str | Path, name: str, ground: Ground) -> Section:
-    """Read a line in plan, its points in order: x_m, y_m in survey coordinates.
+    """Read a line in plan, of a map or of a table of its points in order: see `map_shapes`.
 
     Raises
     ------
-    InputError : anything that is wrong with the table; a line of less than two points, or beside the terrain.
+    InputError : anything that is wrong with the file; several lines, a line of less than two points, or beside the
+        terrain.
     """
-    table = read_table(path, ("x_m", "y_m"), ("x_m", "y_m"))
-    points = np.column_stack([table.numbers(column, required=True) for column in ("x_m", "y_m")])
-    line = points - ground.shift.vector[:2]
+    shapes = read_lines(path, ground.shift)
+    if len(shapes) > 1:
+        raise InputError(f"There are {len(shapes)} lines, and a section is one", file=path, advice="Give one of them")
+    line = shapes[0].parts[0][:, :2]
     apart = np.hypot(*np.diff(line, axis=0).T) > 0
     if not apart.size or not apart.all():
         raise InputError(

@@ -7,7 +7,7 @@ table of corners. For an attribute they are the columns of a table with a row fo
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
@@ -32,6 +32,8 @@ from .tables import Columns, write_columns
 
 FRICTION = "friction"
 VALUE_REQUIRED = ("value",)
+SHAPEFILE_LETTERS = 10
+"""Names of properties are cut to so many letters in shapefiles."""
 VALUE_KNOWN = (*VALUE_REQUIRED, "name")
 
 
@@ -46,7 +48,7 @@ class _Properties:
 
 @reader("map of zones")
 def read_zones(path: str | Path, terrain: Surface | Cloud, models: Sequence[str]) -> Zones:
-    """Zones of the polygons in a file, GeoJSON or a table; see `zones_within` for what overlaps.
+    """Zones of the polygons in a file; see `read_polygons` for its formats, `zones_within` for what overlaps.
 
     Parameters
     ----------
@@ -65,7 +67,7 @@ def read_zones(path: str | Path, terrain: Surface | Cloud, models: Sequence[str]
         cover = zones_within(terrain, [polygon_of(shape, path) for shape in shapes])
     except InputError as error:
         raise InputError(error.problem, file=path, advice=error.advice) from error
-    return _zones(cover, found, models)
+    return _zones(replace(cover, remarks=(*shapes.remarks, *cover.remarks)), found, models)
 
 
 @reader("table of zones")
@@ -214,6 +216,9 @@ def _meant(key: str, models: Sequence[str], found: _Properties, path: Path | Non
             return []
         return [(model, parameter)]
     known = {name: [spec.name for spec in find_model(name).parameters] for name in models}
+    if len(key) == SHAPEFILE_LETTERS:
+        whole = {one for ones in known.values() for one in ones if one.startswith(key)}
+        key = whole.pop() if len(whole) == 1 else key
     of = [(name, key) for name in models if key in known[name]]
     if of:
         return of

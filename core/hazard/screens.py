@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..remarks import Remark
 from ..simulation.engine import ENDS, LIMIT, Records, Simulation
 from ..simulation.ground import Ground
 from ..simulation.parabolas import Parabolas, parabolas_of
@@ -37,6 +38,7 @@ class Screen:
     line : (p, 2) in plan, local [m].
     height_m : of a barrier, vertically above the terrain [m].
     capacity_j : the kinetic energy up to which a barrier holds a block [J]; None for a screen that only measures.
+    remarks : what a user should know of how its file was read.
 
     Raises
     ------
@@ -47,6 +49,7 @@ class Screen:
     line: Array
     height_m: float = inf
     capacity_j: float | None = None
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
         if self.line.ndim != 2 or len(self.line) < 2 or not np.isfinite(self.line).all() or not self.length_m > 0:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, visible
 from ..exchange.toml_text import read_toml
 from ..film.composed.blocks import sun_direction
 from ..film.composed.falls import Fall
@@ -145,11 +145,11 @@ def _page(show: Show, language: str, most_faces: int) -> Page:
         "tables": packing.tables,
     }
     parts = {
-        "title": escape(show.site.name),
+        "title": escape(visible(show.site.name)),
         "language": language,
         "no_script": escape(page_texts()[language]["no_script"]),
         "style": _asset("page.css"),
-        "show": json.dumps(content, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"),
+        "show": visible(json.dumps(content, ensure_ascii=False, separators=(",", ":"))).replace("<", "\\u003c"),
         "tables": packing.text(),
         "licence": _asset("LICENSE-three.txt").strip(),
         "library": _asset("three.min.js").strip(),

@@ -20,6 +20,7 @@ class Polygon:
     ----------
     name : for people; several may share one.
     rings : each (k, 2), local [m]: outlines and holes, each closed by itself.
+    number : of the feature in its file, from 1; 0 without one.
 
     Raises
     ------
@@ -29,6 +30,7 @@ class Polygon:
 
     name: str
     rings: tuple[Array, ...]
+    number: int = 0
 
     def __post_init__(self) -> None:
         from .polygon_kernels import first_crossing

@@ -20,6 +20,7 @@ from ..terrain.raycast import cast_rays, closest_points
 from ..terrain.surface import face_cross_products
 from ..vectors import Array, Indices, Mask, Names, norm, unit
 from .blocks import Blocks, draw_blocks
+from .coverage import check_areas, check_lines, parts_on
 from .ground import Ground
 from .memory import check_blocks
 from .polygons import Polygon
@@ -73,33 +74,38 @@ def on_line(
 
     Raises
     ------
-    InputError : a line of one point, or without length, beside the terrain or far from it; see `on_points`.
+    InputError : a line of one point, or without length, wholly outside of the terrain or far from it; see `on_points`.
 
     Notes
     -----
+    Blocks start where there is terrain below the line; a part outside of it has none, which is said.
     Lengths are those of the line as it is drawn, in plan where it has no heights (NaN).
     """
     check_number(number)
     names = names or [""] * len(lines)
-    starts, ends, owner = [], [], []
+    parts: list[Array] = []
+    owner = list[int]()
     for i, line in enumerate(lines):
         what = f"The line {names[i]}" if names[i] else "The line"
         if not np.isfinite(line[:, :2]).all():
             raise InputError(f"{what} has a coordinate that is not finite", advice="Correct it")
         if len(line) < 2 or not np.nan_to_num(np.ptp(line, axis=0)).any():
             raise InputError(f"{what} has no length", advice="Give at least two different points")
-        starts.append(line[:-1])
-        ends.append(line[1:])
-        owner += [i] * (len(line) - 1)
-    if not starts:
+    if not lines:
         raise InputError("There is no line to release blocks from", advice="Give at least one")
-    start, end = np.concatenate(starts), np.concatenate(ends)
+    outside = check_lines(ground.terrain, lines, names, "line of releases", "no block starts there")
+    for i, line in enumerate(lines):
+        on = parts_on(ground.terrain, line) if outside else [line]
+        parts += on
+        owner += [i] * sum(len(part) - 1 for part in on)
+    start, end = np.concatenate([part[:-1] for part in parts]), np.concatenate([part[1:] for part in parts])
     way = end - start
     cumulated = np.cumsum(norm(np.where(np.isnan(way), 0.0, way)))
     part = (np.arange(number) + 0.5) / number if evenly else _uniform(seed, number, 1, 0)[:, 0]
     at, within = _chosen(cumulated, part)
     points = start[at] + within[:, None] * way[at]
-    return _fixed(ground, points, np.array(names, dtype=np.str_)[np.array(owner)[at]], blocks, seed)
+    named = np.array(names, dtype=np.str_)[np.array(owner)[at]]
+    return _fixed(ground, points, named, blocks, seed).with_remarks(*outside)
 
 
 def in_polygon(
@@ -119,9 +125,11 @@ def in_polygon(
 
     Raises
     ------
-    InputError : no terrain within, or none so steep; a block that is too large for all places; an impossible angle.
+    InputError : a polygon wholly outside of the terrain; no terrain within, or none so steep; a block that is
+        too large for all places; an impossible angle.
     """
     check_number(number)
+    outside = check_areas(ground.terrain, polygons, "release area", "no block starts there")
     pieces, areas, normals, which = _pieces(ground, polygons)
     if steeper_than is not None:
         steep = _steeper(normals, steeper_than)
@@ -134,7 +142,7 @@ def in_polygon(
             or ("Check its coordinates" if steeper_than is None else "Give a smaller angle, or another polygon"),
         )
     name = np.array([polygon.name for polygon in polygons], dtype=np.str_)[which]
-    return _anywhere(ground, pieces, areas, normals, name, blocks, number, seed)
+    return _anywhere(ground, pieces, areas, normals, name, blocks, number, seed).with_remarks(*outside)
 
 
 def steeper_than(ground: Ground, angle: float, blocks: Blocks, number: int, seed: int = 0) -> Releases:

@@ -9,7 +9,7 @@ part of that law: see `against_stem`.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import Any
 
@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..terrain.cloud import Cloud, heights_above_points
-from ..terrain.raycast import cast_rays
+from ..terrain.cloud import Cloud
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices, Mask, Names
+from .coverage import check_areas, heights_at
 from .polygons import Polygon
 
 ENERGY_J, EXPONENT = 38.7, 2.31
@@ -128,7 +128,7 @@ def placed_trees(
             f"A tree has a diameter of {dbh_m.max():g} m",
             advice=f"Diameters are in cm and below {100 * THICKEST_M:g}: is its unit another one?",
         )
-    foot = _heights(terrain, position)
+    foot = heights_at(terrain, position)
     there: Mask = np.isfinite(foot)
     if not there.any():
         raise InputError("No tree stands on the terrain", advice="Give their coordinates in the terrain's system")
@@ -167,7 +167,7 @@ def random_trees(
 
     Raises
     ------
-    InputError : more trees than fit, or thicker ones than there are; no tree on the terrain.
+    InputError : more trees than fit, or thicker ones than there are; no tree on the terrain, an area outside of it.
     """
     if mean_dbh_m > THICKEST_M:
         raise InputError(
@@ -185,6 +185,7 @@ def random_trees(
         raise InputError(
             f"{per_hectare:g} stems per hectare are {expected:.3g} trees on this terrain", advice=f"{MOST:.0g} fit"
         )
+    remarks = check_areas(terrain, among, "forest", "no tree stands there")
     chance = np.random.Generator(np.random.Philox(seed))
     number = int(chance.poisson(expected))
     position = chance.uniform(low, high, (number, 2))
@@ -198,22 +199,12 @@ def random_trees(
             inside |= polygon.contains(position)
         position, dbh = position[inside], dbh[inside]
     dbh = np.minimum(dbh, THICKEST_M)
-    on = np.isfinite(_heights(terrain, position))
+    on = np.isfinite(heights_at(terrain, position))
     position, dbh = position[on], dbh[on]
     if not len(dbh):
         raise InputError("No tree was drawn", advice="Give more stems per hectare, or a larger area on the terrain")
-    return placed_trees(terrain, position, dbh, np.full(len(dbh), height_m), greatest_loss(dbh, factor))
-
-
-def _heights(terrain: Surface | Cloud, position: Array) -> Array:
-    """(t,) of the highest ground at places in plan (t, 2), local [m]; NaN where there is none."""
-    points = terrain.vertices if isinstance(terrain, Surface) else terrain.points
-    top = float(points[:, 2].max()) + 1.0
-    above = np.column_stack([position, np.full(len(position), top)])
-    if isinstance(terrain, Cloud):
-        return top - heights_above_points(terrain, above)
-    down: Array = cast_rays(terrain, above, (0, 0, -1)).distance
-    return np.where(np.isfinite(down), top - down, np.nan)
+    trees = placed_trees(terrain, position, dbh, np.full(len(dbh), height_m), greatest_loss(dbh, factor))
+    return replace(trees, left_out=(*trees.left_out, *map(str, remarks)))
 
 
 def in_cells(trees: Trees | None) -> Any:

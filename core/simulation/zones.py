@@ -2,7 +2,7 @@
 """Which part of the terrain is in which zone."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from ..terrain.cloud import Cloud
 from ..terrain.misplaced import unit_hint
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices, Mask
+from .coverage import check_areas
 from .ground import element_places
 from .polygons import Polygon
 
@@ -45,15 +46,18 @@ def zones_within(terrain: Surface | Cloud, polygons: Sequence[Polygon]) -> ZoneC
 
     Raises
     ------
-    InputError : a polygon without a name, or with that of the whole; none of them is on the terrain.
+    InputError : a polygon without a name, or with that of the whole; one that is wholly outside of the terrain.
     """
+    _checked([polygon.name for polygon in polygons])
+    outside = check_areas(terrain, polygons, "zone", "it ends there")
     middles = element_places(terrain)[:, :2]
-    return zones_of_parts(
+    cover = zones_of_parts(
         terrain,
         [(polygon.name, polygon.contains(middles)) for polygon in polygons],
         unit_hint(np.concatenate([ring for polygon in polygons for ring in polygon.rings]), terrain)
         or "Check the coordinates of the polygons",
     )
+    return replace(cover, remarks=(*outside, *cover.remarks))
 
 
 def zones_of_parts(terrain: Surface | Cloud, parts: Sequence[tuple[str, Mask]], advice: str) -> ZoneCover:

@@ -36,6 +36,7 @@ from ..vectors import Array
 from .barrier_verdicts import evidence_sentence, more_words, verdict_remark
 from .enough import in_chance_order, is_known
 from .hazard import Counted, run_chunks
+from .screens import outside_remarks
 
 DRAWN = 250
 """Runs of each model that are drawn, evenly among all."""
@@ -273,7 +274,8 @@ def _no_block(screen: str, one: ModelDesign, title: str) -> str:
 
 def _remarks(sheet: DesignSheet) -> list[Remark]:
     """What is not known, and why, beside the verdicts."""
-    found, share = [], f"{100 * sheet.share:g} %"
+    found, share = [*outside_remarks(sheet.screens, sheet.ground)], f"{100 * sheet.share:g} %"
+    found += [remark for remark in sheet.ground.remarks if remark.severity == "warning"]
     for one in sheet.models:
         model, title = one.settings.model, find_model(one.settings.model).title
         for screen in sheet.screens:

@@ -10,7 +10,9 @@ from ..impact_models.registry import find_model
 from ..progress import Progress, silent
 from ..remarks import Remark
 from ..simulation.convergence import fewest
+from ..simulation.coverage import check_lines
 from ..simulation.engine import Simulation
+from ..simulation.ground import Ground
 from .barrier_verdicts import verdict_remark
 
 
@@ -24,6 +26,13 @@ def tallies_of(
         tallies[simulation.settings.model] = tally = ScreenTally(screens)
         tally.add(simulation)
     return tallies
+
+
+def outside_remarks(screens: Sequence[Screen], ground: Ground) -> tuple[Remark, ...]:
+    """How the screens' files were read, and which screens are partly outside of the terrain; see `check_screens`."""
+    lines, names = [screen.line for screen in screens], [screen.name for screen in screens]
+    read = dict.fromkeys(remark for screen in screens for remark in screen.remarks)
+    return (*read, *check_lines(ground.terrain, lines, names, "screen", "no block is seen there", refuse=False))
 
 
 def screen_remarks(tallies: Mapping[str, ScreenTally]) -> tuple[Remark, ...]:

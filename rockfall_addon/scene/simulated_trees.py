@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.exchange.job_inputs import input_hashes
 from ...core.exchange.simulation_entry import TreesEntry
+from ...core.formats.shapefile import parts_beside
 from ...core.simulation.trees import Trees
 from ...core.vectors import Array
 from . import materials, store
@@ -65,6 +66,8 @@ def fingerprint(scene: bpy.types.Scene) -> list[object]:
     if entry is None:
         return []
     files = {name: file for name in ("file", "within") if (file := getattr(entry, name)) is not None}
+    for name, file in list(files.items()):
+        files |= {f"{name}{suffix}": part for suffix, part in parts_beside(file).items()}
     return [replace(entry, file=None, within=None), input_hashes(files)]
 
 
@@ -77,6 +80,8 @@ def copied(entry: TreesEntry | None, place: Path) -> TreesEntry | None:
         if source is not None:
             copy = place / f"{stem}{source.suffix}"
             shutil.copyfile(source, copy)
+            for suffix, part in parts_beside(source).items():
+                shutil.copyfile(part, copy.with_suffix(suffix))
             entry = replace(entry, **{name: copy})
     return entry
 

@@ -26,7 +26,7 @@ from ...core.remarks import Remark, from_plain, gravest_first, to_plain
 from ...core.simulation.engine import Simulation
 from ...core.terrain.cloud import Cloud
 from ...core.terrain.surface import Surface
-from ...core.workflow.screens import screen_remarks, tallies_of
+from ...core.workflow.screens import outside_remarks, screen_remarks, tallies_of
 from ...core.workflow.simulation import ReleaseSource, Scenario, ground_of, remarks_of, run_models
 from . import (
     fingerprints,
@@ -165,7 +165,8 @@ def run(plan: Plan, progress: Progress) -> Found:
             "Lower the number, or use `rockfall simulate`, which has no such limit."
         )
     simulations = run_models(ground, releases, plan.scenario.settings, progress=progress)
-    remarks = gravest_first([*plan.remarks, *remarks_of(simulations, models), *_stays(simulations)])
+    outside = outside_remarks(plan.screens, ground)
+    remarks = gravest_first([*plan.remarks, *remarks_of(simulations, models), *outside, *_stays(simulations)])
     tallies = tallies_of(simulations, plan.screens, progress)
     shown = [with_barriers(one, tallies[one.settings.model].hits) if tallies else one for one in simulations]
     return Found([simulation.prepare(one) for one in shown], screens.results_of(tallies), tuple(remarks))
@@ -196,7 +197,7 @@ def export(plan: Plan, counts: Mapping[str, int], folder: Path, progress: Progre
             some = releases.take(slice(0, counts[one.model]))
             found += run_models(ground, some, [one], progress=progress)
     tallies = tallies_of(found, plan.screens, progress)
-    remarks = gravest_first([*remarks_of(found), *screen_remarks(tallies)])
+    remarks = gravest_first([*remarks_of(found), *outside_remarks(plan.screens, ground), *screen_remarks(tallies)])
     with output_folder(folder) as place:
         records = default_records(len(releases))
         return write_simulations(

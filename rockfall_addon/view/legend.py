@@ -9,6 +9,7 @@ import gpu
 from gpu_extras.batch import batch_for_shader
 
 from ...core.colours import SPEED_SCALE
+from ...core.errors import visible
 from .workspace import free_part
 
 WIDTH, HEIGHT, MARGIN, TEXT = 220, 12, 28, 12  # in pixels at interface scale 1
@@ -99,7 +100,7 @@ def bar(left: float, scale: float, top: float, title: str) -> None:
 def text(x: float, y: float, words: str) -> None:
     """Words at a place of the region."""
     blf.position(0, x, y, 0)
-    blf.draw(0, words)
+    blf.draw(0, visible(words))
 
 
 def _wide(words: str) -> float:

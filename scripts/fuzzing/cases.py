@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import examples
+import kept_chunks
+import maps
 import numpy as np
 import shown
 import simulations
@@ -48,15 +50,20 @@ def _ran(*words: str, out: bool = True) -> Callable[[Path], object]:
     return run
 
 
-def cases(folder: Path) -> dict[str, Case]:
-    """Name → case; `folder` is for files that libraries write only to a disc."""
+def cases(folder: Path, quick: bool = False) -> dict[str, Case]:
+    """Name → case; `folder` is for files that libraries write only to a disc. `quick` makes none that must simulate."""
     terrains = examples.terrain_files(folder)
     found = {**_terrains(terrains), **_tables(), **_videos(), **_projects(terrains["b.ply"]), **_coloured()}
     (folder / "impacts.csv").write_bytes(examples.IMPACTS)
     main(["merge", str(folder / "impacts.csv"), "--out", str(folder / "package")])
     package = {f"package/{path.name}": path.read_bytes() for path in (folder / "package").glob("*.[cj]s*")}
     found["package"] = Case(package, tuple(package), lambda at: _package(at / "package"))
+    if not quick:
+        kept = kept_chunks.files(terrains["b.ply"], folder / "chunks")
+        on = kept_chunks.reader(terrains["b.ply"], folder / "chunks")
+        found["kept chunks"] = Case(kept, tuple(kept), on, slow=True)
     shutil.rmtree(folder, ignore_errors=True)
+    found |= {name: Case(maps.files(), damaged, read) for name, (damaged, read) in maps.readers().items()}
     return found | _simulations(terrains["b.ply"]) | _shown(terrains["b.ply"], folder) | _commands(terrains["b.ply"])
 
 

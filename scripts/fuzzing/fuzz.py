@@ -129,7 +129,7 @@ def _work(connection: Connection, options: argparse.Namespace) -> None:
     root = Path(tempfile.mkdtemp(prefix="fuzz"))
     (root / "made").mkdir()
     with tempfile.TemporaryFile() as nowhere, _caught_output(nowhere):
-        every = chosen(cases(root / "made"), options)
+        every = chosen(cases(root / "made", options.quick), options)
         for case in every.values():  # what is whole is read, and everything is imported and compiled
             _place(root / "case", case.files)
             problem = judge(case, root / "case")
@@ -252,7 +252,7 @@ def main() -> int:
 def _keep(options: argparse.Namespace, number: int) -> None:
     with tempfile.TemporaryDirectory() as folder, open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
         (Path(folder) / "made").mkdir()
-        every = chosen(cases(Path(folder) / "made"), options)
+        every = chosen(cases(Path(folder) / "made", options.quick), options)
     names = list(every)
     _place(options.keep / str(number), files_of(every[names[number % len(names)]], options.seed, number))
 

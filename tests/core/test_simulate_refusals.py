@@ -88,7 +88,7 @@ SCREENED = ["--screen", "@net.csv"]
         (["--screen", "@weak.csv"], "@weak.csv: The capacity of barrier 'net' is -1 kJ. Give kJ above zero"),
         (["--zones", "@rest.csv"], "@rest.csv: A zone is called 'terrain', as the rest of the ground is. Give"),
         (["--zones", "@nameless.csv"], "@nameless.csv: A zone has no name. Name each"),
-        (["--zones", "@far.csv"], "@far.csv: No zone is anywhere on the terrain. Check the coordinates"),
+        (["--zones", "@far.csv"], "@far.csv: The zone far (feature 1) is wholly outside of the terrain. Check its"),
         (["--zones", "@bow.csv"], "@bow.csv: The polygon bow crosses itself. Give the corners in their order"),
         (["--zones", "@flat.csv"], "@flat.csv: The polygon flat has no area: its corners are on a line. Give corners"),
         (["--contact", "points", "--max-edge", "2"], "--max-edge is of a mesh, and --contact points makes none. Leave"),
@@ -127,7 +127,7 @@ def test_trees_that_cannot_be_drawn(
     [
         ([], "Nothing says where blocks start. Give a table of releases, or give --from-line"),
         (["--from-line", "@point.csv"], "@point.csv: The line l has no length. Give at least two different points"),
-        (["--from-line", "@far_line.csv"], "@far_line.csv: There is no terrain at 2601000.00, "),
+        (["--from-line", "@far_line.csv"], "@far_line.csv: The line of releases l is wholly outside of the terrain."),
         (["--from-line", "@line.csv", "--diameter", "500"], "A block of 500 m is larger than the terrain, which"),
         (["--from-line", "@line.csv", "--number", "0"], "@line.csv: 0 blocks cannot be released. Release at least one"),
         (["--from-line", "@line.csv", "--proportions", "3:x:1"], "--proportions 3:x:1 are not three numbers. Write"),
@@ -136,7 +136,7 @@ def test_trees_that_cannot_be_drawn(
         (["--from-line", "@line.csv", "--diameter", "lognormal:0.5,-1"], "standard deviation of lognormal:0.5,-1 is"),
         (["--steeper-than", "80"], "No terrain is steeper than 80°. Give a smaller angle; the steepest is 35.0°"),
         (["--steeper-than", "200"], "200° is no angle of a slope. Give one from 0 to 180"),
-        (["--from-polygon", "@far.csv"], "@far.csv: There is no terrain within the polygon. Check its coordinates"),
+        (["--from-polygon", "@far.csv"], "@far.csv: The release area far (feature 1) is wholly outside of"),
         (
             ["--from-polygon", "@all.csv", "--steeper-than", "80"],
             "@all.csv: There is no terrain within the polygon that is steeper than 80°. Give a smaller angle",

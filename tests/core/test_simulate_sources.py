@@ -180,7 +180,7 @@ def test_bad_options_are_refused_and_leave_nothing(simulate, capsys, options, me
     ("name", "text", "message"),
     [
         ("line.csv", f"x_m,y_m\n{EAST + 5},{NORTH + 5}\n", "1 different point. A line needs at least 2"),
-        ("line.csv", "x_m,y_m\n900,5\n900,9\n", "There is no terrain at 900.00, 5"),
+        ("line.csv", "x_m,y_m\n900,5\n900,9\n", "The line of releases is wholly outside of the terrain"),
         ("line.csv", f"x_m,y_m\n{EAST},north\n", "row 2: 'north'"),
         ("line.geojson", "{", "The GeoJSON file cannot be read"),
         ("line.geojson", "[]", "no object"),
@@ -208,7 +208,7 @@ def test_bad_polygons_are_refused(simulate, tmp_path: Path, capsys) -> None:
         (((2, 5), (8, 5)), "2 different points"),
         (((2, 5), (8, 5), (5, 5)), "no area"),
         (((2, 5), (8, 5), (2, 9), (8, 8)), "crosses itself"),
-        (((900, 5), (908, 5), (908, 9)), "There is no terrain within the polygon"),
+        (((900, 5), (908, 5), (908, 9)), "wholly outside of the terrain"),
     ):
         assert simulate("--from-polygon", polygon_file(tmp_path, *corners))[0] == 1
         assert message in capsys.readouterr().err

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...errors import DependencyError
+from ...errors import DependencyError, visible
 from ...opencv import opencv
 from ...vectors import Array
 from .look import INK, PANEL_OPACITY, PAPER, REGULAR, Colour, Look
@@ -247,7 +247,7 @@ def text_width(text: str, size: int, weight: int = REGULAR) -> int:
 
 def _pieces_of(text: str, size: int) -> list[tuple[str, int, float]]:
     """A line in pieces, each with its size and how much lower it stands: R_N has its N lower and smaller."""
-    text = text.translate(LACKING)
+    text = visible(text).translate(LACKING)
     pieces, at = [], 0
     for found in SUBSCRIPTED.finditer(text):
         pieces += [

@@ -13,6 +13,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
+from ....core.errors import visible
 from ...scene import alignment, camera_paths, clocks, pairs, problems, store, video_files, videos
 from ...scene.next_step import ALIGN_TOOL
 from ...view import image_view
@@ -280,5 +281,5 @@ def _text(x: float, y: float, text: str, colour: Colour, size: float) -> None:
     blf.shadow(0, OUTLINE, 0.0, 0.0, 0.0, 0.9)
     blf.color(0, *colour)
     blf.position(0, x, y, 0)
-    blf.draw(0, text)
+    blf.draw(0, visible(text))
     blf.disable(0, blf.SHADOW)

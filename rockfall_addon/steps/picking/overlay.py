@@ -6,6 +6,7 @@ import bpy
 import gpu
 import numpy as np
 
+from ....core.errors import visible
 from ...scene import clicks, picks, places, problems, proposal, store, videos
 from ...view import drawing, footage_view, image_view, pointing
 from ...view.drawn import Drawing, Mark
@@ -108,5 +109,5 @@ def _mark(mark: Mark, at: np.ndarray, scale: float) -> None:
         blf.enable(0, blf.SHADOW)
         blf.shadow(0, 5, 0.0, 0.0, 0.0, 1.0)
         blf.position(0, float(at[0]) + BESIDE * scale, float(at[1]) - 4 * scale, 0)
-        blf.draw(0, mark.text)
+        blf.draw(0, visible(mark.text))
         blf.disable(0, blf.SHADOW)

@@ -186,7 +186,8 @@ class SimulationSettings(bpy.types.PropertyGroup):
         default=10.0, min=0.0, soft_max=50.0, max=500.0, precision=0,
     )  # fmt: skip
     trees_within: StringProperty(
-        name="Within", description="Polygons outside of which no trees are drawn: GeoJSON, or a table of corners. "
+        name="Within", description="Polygons outside of which no trees are drawn: a shapefile, KML, GeoJSON, a "
+        "GeoPackage, or a table of corners. "
         "Empty: everywhere on the terrain", subtype="FILE_PATH",
     )  # fmt: skip
     tree_height_m: FloatProperty(

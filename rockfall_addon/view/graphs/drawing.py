@@ -18,6 +18,7 @@ from mathutils import Matrix
 from ....core.analysis.axes import Axis
 from ....core.analysis.graph_layout import Frame, Rectangle
 from ....core.analysis.svg import Svg
+from ....core.errors import visible
 from .look import FONT, Look, Rgb, Rgba, alpha
 
 SHAPES = ("circle", "diamond", "square", "triangle", "down", "cross", "plus", "hexagon", "star", "ring")
@@ -298,6 +299,7 @@ def text(
     anchor : the place within the words that lies there, from 0 to 1 along and across them.
     upright : read from below.
     """
+    words = visible(words)
     blf.size(FONT, size)
     width, height = float(blf.dimensions(FONT, words)[0]), 0.72 * size
     if _paper:

@@ -25,7 +25,7 @@ def open_film(job: FilmJob) -> bpy.types.Scene:
         problem = str(error).removeprefix("Error: ").strip().rstrip(".")
         raise InputError(f"Blender cannot open this ({problem})", file=job.source, advice="Save it again") from error
     scene = bpy.data.scenes[job.scene] if job.scene else bpy.context.scene
-    if migration.is_newer(scene):
+    if migration.is_left_alone(scene):
         raise InputError(migration.warning(scene), file=job.source)
     if not store.has_role(scene, store.FLIGHTS_ROLE):
         raise InputError(

@@ -2,9 +2,9 @@
 """A random walk over what a person can do to a scene: every operator of ours, what Blender does to objects, scenes and
 collections, undo and redo, saving and loading. After each step no pick is lost and nothing has gone wrong.
 
-Every step is stored for undo, as those of a person are. Blender itself (5.2, also without Rockfall) crashes now and then
-in an undo after a script has made or removed data-blocks that no stored step knows: of walks that store two steps of
-five, about every second one ends so.
+Every step is stored for undo, as those of a person are. Blender itself (5.2, also without Rockfall) crashes now and
+then in an undo after a script has made or removed data-blocks that no stored step knows: of walks that store two steps
+of five, about every second one ends so.
 
 Used in Blender as a module, in a process of its own (test_random_walk.py, scripts/fuzzing/walk_blender.py), and in a
 window (tests/interface/walk_of_operators.py).

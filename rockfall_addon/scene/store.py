@@ -196,7 +196,8 @@ def linked_files(scene: bpy.types.Scene) -> dict[str, int]:
     found: dict[str, int] = {}
     for obj in scene.objects if bpy.data.libraries else ():
         if isinstance(obj.get(ROLE), str) and not is_own(obj):
-            library = obj.library or obj.override_library.reference.library
+            reference = obj if obj.library is not None else obj.override_library.reference
+            library = reference.library if reference is not None else None
             path = library.filepath if library is not None else ""
             found[path] = found.get(path, 0) + 1
     return found

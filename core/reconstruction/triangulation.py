@@ -235,11 +235,11 @@ def triangulate(
             break
     covariance = np.full((n, 3, 3), np.nan)
     covariance[good] = inverse(information[good])
-    for i, camera in enumerate(cameras if pose_covariances is not None else ()):
+    for i, pose in enumerate(() if pose_covariances is None else pose_covariances):
         use = good[seen[i, good]]
-        found = project_with_derivatives(camera, point[use])
-        gain = inverse(information[use]) @ np.swapaxes(found.d_point, 1, 2) / sigma[i, use, None, None] ** 2
-        covariance[use] += gain @ _by_pose(found, pose_covariances[i], use, n) @ np.swapaxes(gain, 1, 2)
+        found = project_with_derivatives(cameras[i], point[use])
+        gain = np.asarray(inverse(information[use]) @ np.swapaxes(found.d_point, 1, 2) / sigma[i, use, None, None] ** 2)
+        covariance[use] += gain @ _by_pose(found, pose, use, n) @ np.swapaxes(gain, 1, 2)
     count = np.maximum(seen.sum(axis=0), 1)
     miss = np.sqrt(np.where(seen, distance_to_ray(point, origin, direction) ** 2, 0.0).sum(axis=0) / count)
     return SpacePoints(point, covariance, np.where(np.isfinite(point[:, 0]), miss, np.nan), residual)

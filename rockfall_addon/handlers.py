@@ -5,6 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from .scene import (
+    appended,
     comparison,
     defaults,
     fingerprints,
@@ -95,6 +96,17 @@ def _saving(_path: str, _unused: object = None) -> None:
         comparison.catch_up(scene)
 
 
+@persistent
+@problems.guarded
+def _imported(context: bpy.types.BlendImportContext, _unused: object = None) -> None:
+    """Something was appended or linked: what is of this file now belongs to its scenes."""
+    came = {item.id for item in context.import_items if item.id is not None}
+    for scene in bpy.data.scenes:
+        if "LINK" not in context.options:
+            appended.take_in(scene, came)
+        sync.touch(scene)
+
+
 @problems.guarded
 def _rate_changed() -> None:
     for scene in bpy.data.scenes:
@@ -122,7 +134,7 @@ def _catch_up() -> None:
     for scene in bpy.data.scenes:
         migration.migrate(scene)
         defaults.begin(scene)
-        if not migration.is_newer(scene):
+        if not migration.is_left_alone(scene):
             set_aside.look(scene)  # before anything reads it
             for members in fingerprints.by_trajectory(picks.objects_of(scene)).values():
                 pick_names.follow(members)  # before Blender takes its first undo step
@@ -137,7 +149,7 @@ def _selected_otherwise() -> None:
 
 
 def _keep_rate(scene: bpy.types.Scene) -> None:
-    if not migration.is_newer(scene) and timing.follow_frame_rate(scene):
+    if not migration.is_left_alone(scene) and timing.follow_frame_rate(scene):
         sync.touch(scene)
 
 
@@ -156,6 +168,7 @@ HANDLERS = (
     ("render_init", _follow_rate),
     ("load_post", _loaded),
     ("save_pre", _saving),
+    ("blend_import_post", _imported),
     ("undo_post", _restored),
     ("redo_post", _restored),
 )

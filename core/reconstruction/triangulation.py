@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..camera.model import SIGMA_PX, Camera, project, project_with_derivatives, rays
+from ..camera.model import SIGMA_PX, Camera, Projection, project, project_with_derivatives, rays
 from ..errors import InputError
 from ..least_squares import damped_step, inverse
 from ..terrain.raycast import cast_rays
 from ..terrain.surface import Surface
-from ..vectors import Array, Mask, across, cross, distance_to_ray, dot, norm, perpendicular, unit
+from ..vectors import Array, Indices, Mask, across, cross, distance_to_ray, dot, norm, perpendicular, unit
 from .placement import terrain_normals
+from .refinement.ground_errors import normal_variance
 
 GRAZING_DEG = 5.0
 """Between a ray and the terrain; below it a pixel covers metres of ground."""
@@ -29,8 +30,9 @@ class TerrainPicks:
     Attributes
     ----------
     point, normal : (n, 3) where the ray meets the terrain [m], and the normal of the face there; NaN when it misses.
-    covariance : (n, 3, 3) of the point, from the pixel's standard deviation, in the plane of the face [m²].
-    ellipse : (n, 2, 3) half axes of the ellipse of one standard deviation, the longer one first [m].
+    covariance : (n, 3, 3) of the point [m²]: of the pixel, and of the pose and the terrain as far as these are given.
+    ellipse : (n, 2, 3) half axes of its ellipse of one standard deviation in the plane of the face, the longer one
+        first [m].
     grazing : (n,) angle between the ray and the terrain [rad].
     warning : n sentences, empty where all is well.
     """
@@ -51,6 +53,8 @@ def pick_on_terrain(
     *,
     position: Array | None = None,
     rotation: Array | None = None,
+    pose_covariance: Array | None = None,
+    sigma_terrain_m: float = 0.0,
 ) -> TerrainPicks:
     """Where the rays through pixels meet the terrain first.
 
@@ -59,11 +63,15 @@ def pick_on_terrain(
     pixels : (n, 2) [px].
     sigma_px : (n,) standard deviation of u and of v [px].
     position, rotation : (n, 3) and (n, 3, 3), a pose for each pixel instead of the camera's own.
+    pose_covariance : (6, 6) or (n, 6, 6) of the poses: rotation vector [rad] about the axes of the camera in that
+        picture, and position [m]; without it the poses are taken to be exact.
+    sigma_terrain_m : accuracy of the terrain, see `ground_errors.normal_variance`; 0 for an exact one.
 
     Notes
     -----
-    First order: the point slides on the plane of its face. At grazing angles a pixel covers metres of terrain, and the
-    ray may as well meet the hump in front or the one behind: that is warned of below 5°.
+    First order: the point slides on the plane of its face, and where that plane is off, along the ray. At grazing
+    angles a pixel covers metres of terrain, and the ray may as well meet the hump in front or the one behind: that is
+    warned of below 5°.
     """
     pixel = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
     n = len(pixel)
@@ -80,16 +88,23 @@ def pick_on_terrain(
     if met.size:
         place = None if position is None else position[met]
         turn = None if rotation is None else rotation[met]
-        by_point = project_with_derivatives(camera, point[met], position=place, rotation=turn).d_point
+        seen_there = project_with_derivatives(camera, point[met], position=place, rotation=turn)
+        by_point = seen_there.d_point
         along = unit(direction[met] - dot(direction[met], normal[met])[:, None] * normal[met])
         bare = ~np.isfinite(along[:, 0])  # looking straight down on the face: any axis does
         along = np.where(bare[:, None], perpendicular(normal[met])[0], along)
         plane = np.stack([along, cross(normal[met], along)], axis=2)
-        turned_back = np.linalg.inv(by_point @ plane) * sigma[met, None, None]
-        spread = plane @ turned_back
-        covariance[met] = spread @ np.swapaxes(spread, 1, 2)
-        left, size, _ = np.linalg.svd(turned_back)
-        ellipse[met] = np.swapaxes((plane @ left) * size[:, None, :], 1, 2)
+        on_plane = np.linalg.inv(by_point @ plane)  # pixels → the plane's two axes
+        variance = (sigma[met, None, None] ** 2) * np.eye(2)
+        if pose_covariance is not None:
+            variance = variance + _by_pose(seen_there, pose_covariance, met, n)
+        in_plane = on_plane @ variance @ np.swapaxes(on_plane, 1, 2)
+        raised = normal[met][:, :, None] - plane @ on_plane @ by_point @ normal[met][:, :, None]  # along the ray
+        uneven = normal_variance(sigma_terrain_m, normal[met])[:, None, None] * (raised @ np.swapaxes(raised, 1, 2))
+        covariance[met] = plane @ in_plane @ np.swapaxes(plane, 1, 2) + uneven
+        size, axes = np.linalg.eigh(np.swapaxes(plane, 1, 2) @ covariance[met] @ plane)
+        half = np.sqrt(np.maximum(size, 0.0))[:, None, ::-1] * (plane @ axes)[:, :, ::-1]
+        ellipse[met] = np.swapaxes(half, 1, 2)
     warnings = tuple(
         "The ray misses the terrain."
         if np.isnan(angle)
@@ -99,6 +114,13 @@ def pick_on_terrain(
         for angle, axes in zip(grazing, ellipse, strict=True)
     )
     return TerrainPicks(point, normal, covariance, ellipse, grazing, warnings)
+
+
+def _by_pose(seen: Projection, pose_covariance: Array, rows: Indices, n: int) -> Array:
+    """(k, 2, 2) of pixels from (6, 6) or (n, 6, 6) of poses, for the k rows of n that were projected [px²]."""
+    poses = np.broadcast_to(np.asarray(pose_covariance, dtype=np.float64), (n, 6, 6))[rows]
+    by_pose = np.concatenate([seen.d_rotation, seen.d_position], axis=2)
+    return np.asarray(by_pose @ poses @ np.swapaxes(by_pose, 1, 2))
 
 
 def contact_points(
@@ -141,7 +163,7 @@ class SpacePoints:
     Attributes
     ----------
     point : (n, 3) [m]; NaN where fewer than two views see it.
-    covariance : (n, 3, 3) [m²].
+    covariance : (n, 3, 3) of the pixels, and of the poses as far as these are given [m²].
     miss_distance : (n,) root mean square distance of the rays from the point [m].
     residual_px : (v, n, 2) observed less projected [px]; NaN where not seen.
     """
@@ -152,7 +174,13 @@ class SpacePoints:
     residual_px: Array
 
 
-def triangulate(cameras: Sequence[Camera], pixels: Array, sigma_px: Array | float = SIGMA_PX) -> SpacePoints:
+def triangulate(
+    cameras: Sequence[Camera],
+    pixels: Array,
+    sigma_px: Array | float = SIGMA_PX,
+    *,
+    pose_covariances: Sequence[Array] | None = None,
+) -> SpacePoints:
     """Points from their pixels in v views at one common time.
 
     Parameters
@@ -160,6 +188,7 @@ def triangulate(cameras: Sequence[Camera], pixels: Array, sigma_px: Array | floa
     cameras : v, with their poses at that time.
     pixels : (v, n, 2) [px]; NaN where a view does not see the point.
     sigma_px : (v, n) or a number, standard deviation of u and of v [px].
+    pose_covariances : v of (6, 6), as of `pick_on_terrain`; those of different views are independent.
 
     Raises
     ------
@@ -168,7 +197,8 @@ def triangulate(cameras: Sequence[Camera], pixels: Array, sigma_px: Array | floa
     Notes
     -----
     The start is the point of least squared distances from the rays; then Gauss–Newton on the weighted squares of the
-    pixels, which is the maximum of likelihood (Hartley & Sturm 1997).
+    pixels, which is the maximum of likelihood (Hartley & Sturm 1997). The poses are not estimated: their errors move
+    the point as they move the pixels (consider parameters; Schmidt 1966).
     """
     pixel = np.asarray(pixels, dtype=np.float64)
     if len(cameras) < 2 or pixel.ndim != 3 or pixel.shape[::2] != (len(cameras), 2):
@@ -205,6 +235,11 @@ def triangulate(cameras: Sequence[Camera], pixels: Array, sigma_px: Array | floa
             break
     covariance = np.full((n, 3, 3), np.nan)
     covariance[good] = inverse(information[good])
+    for i, pose in enumerate(() if pose_covariances is None else pose_covariances):
+        use = good[seen[i, good]]
+        found = project_with_derivatives(cameras[i], point[use])
+        gain = np.asarray(inverse(information[use]) @ np.swapaxes(found.d_point, 1, 2) / sigma[i, use, None, None] ** 2)
+        covariance[use] += gain @ _by_pose(found, pose, use, n) @ np.swapaxes(gain, 1, 2)
     count = np.maximum(seen.sum(axis=0), 1)
     miss = np.sqrt(np.where(seen, distance_to_ray(point, origin, direction) ** 2, 0.0).sum(axis=0) / count)
     return SpacePoints(point, covariance, np.where(np.isfinite(point[:, 0]), miss, np.nan), residual)

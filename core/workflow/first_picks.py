@@ -14,11 +14,13 @@ from ..reconstruction.motion import GROUNDED
 from ..reconstruction.picks import Picks, make_picks, take
 from ..reconstruction.placement import pick_normals
 from ..reconstruction.ray_flight import flight_through_rays
+from ..reconstruction.refinement.ground_errors import normal_variance
+from ..reconstruction.refinement.setup import default_accuracy
 from ..reconstruction.refinement.views import View
-from ..reconstruction.triangulation import contact_points
-from ..terrain.raycast import cast_rays
+from ..reconstruction.triangulation import SpacePoints, TerrainPicks, contact_points, pick_on_terrain, triangulate
+from ..terrain.raycast import cast_rays, closest_point
 from ..terrain.surface import Surface
-from ..vectors import Array, Indices, Mask, Names
+from ..vectors import Array, Indices, Mask, Names, norm
 from .sightings import NO_EVENTS, Events, SeenVideo, Sightings, joined, some
 
 FAR_M = 100.0
@@ -31,6 +33,8 @@ END_MISS_PX, END_MISS_SIGMAS = 2.0, 4.0
 """Pixels that miss a free flight by more than the larger of these, root mean square, are not of a flight."""
 SIGMA_END_S = 1e-4
 """Of a pass at a tracked pixel: it is where the block was in that frame."""
+
+NOT_FOUND = "The camera was not found in this picture: how well the place is known cannot be said."
 
 Columns = dict[str, Names | Array]
 
@@ -119,6 +123,108 @@ def first_picks(
         sort=True,
     )
     return FirstPicks(picks, tuple(missed))
+
+
+def place_clicked(
+    view: View,
+    video_s: float,
+    pixel: Array,
+    sigma_px: float,
+    surface: Surface,
+    *,
+    centre_of: Block | None = None,
+    sigma_terrain_m: float | None = None,
+    normal_radius_m: float | None = None,
+) -> TerrainPicks:
+    """Where a block touches the terrain that was clicked in a picture, (1, 3), and how well that is known.
+
+    The covariance holds what the click, the camera's pose and the terrain are off; it is infinite where the camera was
+    not found in this picture.
+
+    Parameters
+    ----------
+    video_s : video time of the picture [s].
+    pixel, sigma_px : (2,) and its standard deviation [px].
+    centre_of : the block, when its centre was clicked; None when its contact was.
+    sigma_terrain_m : accuracy of the terrain [m]; None is what is usual for its point spacing.
+    """
+    position, rotation = view.path.poses_at([video_s])
+    camera = replace(view.path.reference, position=position[0], rotation=rotation[0])
+    touching, seen = np.full(3, np.nan), np.asarray(pixel, dtype=np.float64)
+    if centre_of is not None:
+        origin, direction = rays(camera, seen[None])
+        if np.isfinite(direction).all():
+            diameter = np.array([centre_of.diameter_m])
+            touching = contact_points(surface, origin, direction, diameter, normal_radius_m)[0][0]
+        if np.isfinite(touching).all():
+            seen = project(camera, touching)[0]
+    about = touching if np.isfinite(touching).all() else pick_on_terrain(camera, seen[None], surface).point[0]
+    distance = float(norm(about - camera.position)) if np.isfinite(about).all() else FAR_M
+    sigma_terrain = default_accuracy(surface) if sigma_terrain_m is None else sigma_terrain_m
+    pose = view.covariance_at(video_s, distance)
+    known = bool(np.isfinite(pose).all())
+    found = pick_on_terrain(
+        camera, seen[None], surface, sigma_px, pose_covariance=pose if known else None, sigma_terrain_m=sigma_terrain
+    )
+    if not known and np.isfinite(found.point).all():
+        found = replace(found, covariance=np.full((1, 3, 3), np.inf), warning=(NOT_FOUND,))
+    return replace(found, point=touching[None]) if np.isfinite(touching).all() else found
+
+
+def point_clicked(
+    views: Sequence[View], video_s: Sequence[float], pixels: Array, sigma_px: Sequence[float]
+) -> SpacePoints:
+    """The point in space that was clicked in pictures of two videos or more at one moment, with its covariance, which
+    is infinite where a camera was not found in its picture.
+
+    Parameters
+    ----------
+    video_s : of each picture, in the time of its own video [s].
+    pixels, sigma_px : (v, 2) and (v,) their standard deviations [px].
+
+    Raises
+    ------
+    InputError : there are fewer than two views.
+    """
+    poses = [view.path.poses_at([time]) for view, time in zip(views, video_s, strict=True)]
+    cameras = [
+        replace(view.path.reference, position=position[0], rotation=rotation[0])
+        for view, (position, rotation) in zip(views, poses, strict=True)
+    ]
+    pixel, sigma = np.asarray(pixels, dtype=np.float64)[:, None], np.asarray(sigma_px, dtype=np.float64)[:, None]
+    about = triangulate(cameras, pixel, sigma).point[0]
+    distances = [float(np.nan_to_num(norm(about - camera.position), nan=FAR_M)) for camera in cameras]
+    covariances = [view.covariance_at(time, far) for view, time, far in zip(views, video_s, distances, strict=True)]
+    if not np.isfinite(covariances).all():
+        return replace(triangulate(cameras, pixel, sigma), covariance=np.full((1, 3, 3), np.inf))
+    return triangulate(cameras, pixel, sigma, pose_covariances=covariances)
+
+
+def brought_to_terrain(
+    surface: Surface, point: Array, covariance: Array, sigma_terrain_m: float | None = None
+) -> tuple[Array, Array]:
+    """The place of the terrain that is closest to a point (3,), and its covariance (3, 3); the point itself where there
+    is none.
+
+    Along the terrain it is known as the point is, across it as the terrain is.
+
+    sigma_terrain_m : as of `place_clicked`.
+    """
+    near = closest_point(surface, point)
+    if near is None:
+        return point, covariance
+    normal = surface.face_normals[near.face]
+    if not np.isfinite(covariance).all():
+        return near.point, covariance
+    along = np.eye(3) - np.outer(normal, normal)
+    sigma = default_accuracy(surface) if sigma_terrain_m is None else sigma_terrain_m
+    across = normal_variance(sigma, normal[None])[0] * np.outer(normal, normal)
+    return near.point, along @ covariance @ along + across
+
+
+def coordinate_sigma(covariance: Array) -> float:
+    """Standard deviation of a coordinate of a place with a covariance (3, 3): the root mean square of the three [m]."""
+    return float(np.sqrt(np.trace(covariance) / 3))
 
 
 def find_events(view: View, sightings: Sightings, surface: Surface) -> Events:

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...core.reconstruction.triangulation import SpacePoints, epipolar_curve, triangulate
+from ...core.reconstruction.triangulation import SpacePoints, epipolar_curve
 from ...core.vectors import Array
-from . import camera_paths, clocks, pictures, reconstruction, store, videos
+from ...core.workflow.first_picks import point_clicked
+from . import camera_paths, clocks, pictures, reconstruction, sightings, store, videos
 from .places import Place
 
 NEAR_M, FAR_M = 1.0, 5000.0
@@ -85,14 +86,15 @@ def epipolar(scene: bpy.types.Scene, obj: bpy.types.Object, camera: bpy.types.Ob
 
 def triangulated(scene: bpy.types.Scene, obj: bpy.types.Object) -> SpacePoints | None:
     """The point in space of a pick that was clicked in two videos or more; None otherwise."""
-    lenses, pixels, sigmas = [], [], []
+    views, times, pixels, sigmas = [], [], [], []
     for identifier, seen in of(obj).items():
         camera = videos.by_id(scene, identifier)
         if camera is not None and camera_paths.is_solved(camera):
-            lenses.append(pictures.posed(camera, _time_of(camera, seen.frame)))
-            pixels.append(seen.pixel[None])
-            sigmas.append([seen.sigma_px])
-    return triangulate(lenses, np.array(pixels), np.array(sigmas)) if len(lenses) > 1 else None
+            views.append(sightings.view_of(camera))
+            times.append(_time_of(camera, seen.frame))
+            pixels.append(seen.pixel)
+            sigmas.append(seen.sigma_px)
+    return point_clicked(views, times, np.array(pixels), sigmas) if len(views) > 1 else None
 
 
 def _holds(obj: bpy.types.Object) -> bool:

@@ -194,6 +194,8 @@ def follow_parameters(scene: bpy.types.Scene, model: str) -> None:
 
 def catch_up(scene: bpy.types.Scene) -> None:
     """Bring the blocks in line that were moved for other parameters than the scene has now, as after an undo."""
+    if not store.is_own(scene):
+        return
     measured = measured_of(scene)
     if measured.impacts is None or measured.problems:
         return

@@ -4,7 +4,7 @@
 import bpy
 
 from ... import __package__ as ADDON_ID  # noqa: N812
-from . import migration
+from . import migration, store
 
 SHOWN, CLICK = ("block_diameter_m", "density_kgpm3", "block_shape", "colour_by"), ("sigma_px",)
 """Settings of reconstruction and of picking that the preferences have under the same names."""
@@ -13,7 +13,7 @@ SHOWN, CLICK = ("block_diameter_m", "density_kgpm3", "block_shape", "colour_by")
 def begin(scene: bpy.types.Scene) -> None:
     """Give a scene without anything of ours what the preferences say; any other keeps what it has."""
     ours = bpy.context.preferences.addons.get(ADDON_ID)
-    if ours is None or ours.preferences is None or migration.version(scene) is not None:
+    if ours is None or ours.preferences is None or not store.is_own(scene) or migration.version(scene) is not None:
         return
     for settings, names in ((scene.rockfall, SHOWN), (scene.rockfall_picking, CLICK)):
         for name in names:

@@ -16,7 +16,7 @@ from ...core.reconstruction.trajectory import Reconstruction
 from ...core.workflow.design_sheet import design_sheet
 from ...core.workflow.enough import as_many_as
 from ...core.workflow.simulation import ground_of
-from . import picks, reconstruction, screens, simulation_setup, store
+from . import picks, reconstruction, screens, simulation_setup, store, video_files, videos
 from .simulation_setup import Plan
 
 MOST_BLOCKS = 50_000
@@ -100,8 +100,8 @@ def write(asked: Asked, folder: Path, progress: Progress) -> list[str]:
 
 def _inputs(scene: bpy.types.Scene) -> dict[str, Path]:
     """Files of terrain and videos that are there, and the .blend."""
-    kinds = (("terrain", store.TERRAIN_ROLE, store.TERRAIN_FILE), ("video", store.CAMERA_ROLE, store.VIDEO_FILE))
-    said = {f"{what} {obj.name}": obj.get(key) for what, role, key in kinds for obj in store.with_role(scene, role)}
+    said = {f"terrain {obj.name}": obj.get(store.TERRAIN_FILE) for obj in store.with_role(scene, store.TERRAIN_ROLE)}
+    said |= {f"video {camera.name}": video_files.file_of(camera) for camera in videos.cameras(scene)}
     said["Blender file"] = bpy.data.filepath
     files = {name: Path(bpy.path.abspath(str(file))) for name, file in said.items() if file}
     return {name: file for name, file in files.items() if file.is_file()}

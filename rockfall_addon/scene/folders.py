@@ -20,24 +20,24 @@ def remember() -> bool:
         for child in parent.children:
             hangs_in.setdefault(child, []).append(parent.session_uid)
     changed = False
-    for folder in bpy.data.collections:
+    for folder in filter(store.is_own, bpy.data.collections):
         now = hangs_in.get(folder, [])
-        if store.COLLECTION_NAME not in folder or list(folder.get(store.HANGS_IN, ())) == now:
+        if store.COLLECTION_NAME not in folder or _hung_in(folder) == now:
             continue
         changed = True
         if now:
             folder[store.HANGS_IN] = now
         else:
-            del folder[store.HANGS_IN]
+            folder.pop(store.HANGS_IN, None)
     return changed
 
 
 def put_back() -> None:
     """After an undo or redo: link what hangs nowhere, but did when that step was stored."""
-    lost = [folder for folder in bpy.data.collections if folder.get(store.HANGS_IN) and not _users(folder)]
+    lost = [each for each in filter(store.is_own, bpy.data.collections) if _hung_in(each) and not _users(each)]
     parents = {parent.session_uid: parent for parent in _parents()} if lost else {}
     for folder in lost:
-        for identifier in folder[store.HANGS_IN]:
+        for identifier in _hung_in(folder):
             if identifier in parents:
                 parents[identifier].children.link(folder)
                 store.look_again()
@@ -45,8 +45,14 @@ def put_back() -> None:
 
 def _parents() -> Iterator[bpy.types.Collection]:
     """All collections in which others can hang."""
-    yield from (scene.collection for scene in bpy.data.scenes)
-    yield from bpy.data.collections
+    yield from (scene.collection for scene in bpy.data.scenes if store.is_own(scene))
+    yield from filter(store.is_own, bpy.data.collections)
+
+
+def _hung_in(folder: bpy.types.Collection) -> list[int]:
+    """What is written in a collection; nothing where that is no list of numbers."""
+    kept = folder.get(store.HANGS_IN)
+    return kept.to_list() if getattr(kept, "typecode", "") == "i" else []
 
 
 def _users(folder: bpy.types.Collection) -> int:

@@ -23,7 +23,7 @@ from . import camera_paths, clocks, migration, store, video_files, videos
 
 def follow(scene: bpy.types.Scene) -> None:
     """Bring cameras and footage in line with the scene: what handlers call. Changes only what has to change."""
-    if migration.is_newer(scene) or bpy.app.is_job_running("RENDER"):
+    if migration.is_left_alone(scene) or bpy.app.is_job_running("RENDER"):
         return
     objects = videos.cameras(scene)
     if not objects:

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The project's global shift, kept in the scene, also where BlenderGIS keeps it."""
 
+import math
+
 import bpy
 
 from ...core.georeference import GlobalShift
@@ -10,7 +12,7 @@ from . import store
 
 def has_shift(scene: bpy.types.Scene) -> bool:
     """Whether the project has its global shift already."""
-    return store.SHIFT in scene or "crs x" in scene
+    return store.SHIFT in scene or _of_blender_gis(scene) is not None
 
 
 def read_shift(scene: bpy.types.Scene) -> GlobalShift:
@@ -18,9 +20,15 @@ def read_shift(scene: bpy.types.Scene) -> GlobalShift:
     if store.SHIFT in scene:
         x, y, z = (float(value) for value in scene[store.SHIFT])
         return GlobalShift(x, y, z, str(scene.get(store.CRS, "")), str(scene.get(store.VERTICAL, "")))
-    if "crs x" in scene and "crs y" in scene:
-        return GlobalShift(float(scene["crs x"]), float(scene["crs y"]), 0.0, str(scene.get("SRID", "")))
-    return GlobalShift()
+    return _of_blender_gis(scene) or GlobalShift()
+
+
+def _of_blender_gis(scene: bpy.types.Scene) -> GlobalShift | None:
+    """What BlenderGIS has left, where that is two numbers."""
+    kept = [scene.get(key) for key in ("crs x", "crs y")]
+    if not all(isinstance(value, (int, float)) and math.isfinite(value) for value in kept):
+        return None
+    return GlobalShift(float(kept[0]), float(kept[1]), 0.0, str(scene.get("SRID", "")))
 
 
 def forget_shift(scene: bpy.types.Scene) -> None:

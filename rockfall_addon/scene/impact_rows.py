@@ -75,7 +75,7 @@ def go_to(context: bpy.types.Context, scene: bpy.types.Scene, obj: bpy.types.Obj
 def selected(context: bpy.types.Context) -> bpy.types.Object | None:
     """The active pick."""
     obj = context.object
-    return obj if obj is not None and obj.get(store.ROLE) == store.PICK_ROLE else None
+    return obj if obj is not None and obj.get(store.ROLE) == store.PICK_ROLE and store.is_own(obj) else None
 
 
 def _write(row: bpy.types.PropertyGroup, obj: bpy.types.Object) -> None:

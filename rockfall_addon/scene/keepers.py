@@ -22,9 +22,10 @@ def kept_elsewhere(scene: bpy.types.Scene) -> Elsewhere:
     showing = [
         (each, georeference.read_shift(each).vector.tolist(), set(each.objects), _counts(each))
         for each in bpy.data.scenes
+        if store.is_own(each)
     ]
     found = {}
-    for obj in (one for one in scene.objects if one.get(store.ROLE) in KEYED):
+    for obj in (one for one in scene.objects if one.get(store.ROLE) in KEYED and store.is_own(one)):
         own, name = list(obj.get(store.PICK_SHIFT, ())), obj.get(store.TRAJECTORY)
         among = [(shift == own, counts[name], each) for each, shift, there, counts in showing if obj in there]
         keeper = max(among, key=lambda row: row[:2])[2]  # the first of several
@@ -35,4 +36,4 @@ def kept_elsewhere(scene: bpy.types.Scene) -> Elsewhere:
 
 def _counts(scene: bpy.types.Scene) -> Counter[str]:
     """How many picks of each trajectory a scene shows."""
-    return Counter(obj.get(store.TRAJECTORY) for obj in scene.objects if obj.get(store.ROLE) == store.PICK_ROLE)
+    return Counter(obj.get(store.TRAJECTORY) for obj in store.of_role(scene, store.PICK_ROLE))

@@ -115,7 +115,7 @@ def trail_group() -> bpy.types.GeometryNodeTree:
     The polyline's bare points are joined to the tube because Blender keeps the active colour attribute (which the
     viewport's solid mode shows) from the original mesh alone; its edges would be drawn black.
     """
-    existing = bpy.data.node_groups.get(TRAIL_GROUP)
+    existing = bpy.data.node_groups.get((TRAIL_GROUP, None))
     if existing is not None and "Ticks" in existing.interface.items_tree:
         return existing
     group = bpy.data.node_groups.new(TRAIL_GROUP, "GeometryNodeTree")
@@ -235,7 +235,7 @@ def linear_colour(colour: tuple[float, float, float]) -> tuple[float, float, flo
 
 
 def _material(name: str, build: Callable[[bpy.types.ShaderNodeTree, bpy.types.Node], None]) -> bpy.types.Material:
-    existing = bpy.data.materials.get(name)
+    existing = bpy.data.materials.get((name, None))
     if existing is not None:
         return existing
     material = bpy.data.materials.new(name)

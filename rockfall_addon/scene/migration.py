@@ -25,8 +25,18 @@ def is_newer(scene: bpy.types.Scene) -> bool:
     return store.SCHEMA in scene and (version(scene) or 0) > SCHEMA
 
 
+def is_left_alone(scene: bpy.types.Scene) -> bool:
+    """Whether nothing is written into the scene: a newer Rockfall saved it, or it is linked from another file."""
+    return not store.is_own(scene) or is_newer(scene)
+
+
 def warning(scene: bpy.types.Scene) -> str:
-    """What to say about a newer scene."""
+    """What to say about such a scene."""
+    if not store.is_own(scene):
+        return (
+            "This scene is linked from another file, so nothing is computed or changed here. Open that file, or make "
+            "the scene local: Object > Relations > Make Local > All."
+        )
     return (
         f"This scene was saved by a newer Rockfall (schema {version(scene)}, this one knows {SCHEMA}). "
         "Update the extension. Until then nothing is computed or changed here."
@@ -36,7 +46,7 @@ def warning(scene: bpy.types.Scene) -> str:
 def migrate(scene: bpy.types.Scene) -> bool:
     """Bring a scene to the present schema; True when something had to be done."""
     found = version(scene)
-    if found is None or found >= SCHEMA:
+    if found is None or found >= SCHEMA or not store.is_own(scene):
         return False
     for step in STEPS[found:]:
         step(scene)

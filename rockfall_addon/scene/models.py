@@ -8,7 +8,7 @@ import bpy
 
 from ...core.analysis.comparison import Predictions, compare
 from ...core.analysis.predicted_flights import PredictedFlights, fly_predictions
-from ...core.errors import RockfallError
+from ...core.errors import RockfallError, readable
 from ...core.impact_models.machinery.parameters import Value
 from ...core.impact_models.registry import COMPARED, MODELS
 from ...core.reconstruction.drag import Drag
@@ -37,12 +37,18 @@ def parameters_of(scene: bpy.types.Scene, which: str = "A") -> dict[str, dict[st
 
     which : "A", the scene's parameters, or "B", the second set that graphs can show.
     """
-    return store.read_json(scene, PARAMETER_SETS[which], {})
+    return store.read_json(scene, _key_of(which), {})
+
+
+def _key_of(which: str) -> str:
+    if which not in PARAMETER_SETS:
+        raise RockfallError(f"There is no set of parameters {readable(repr(which), 60)}. There are A and B.")
+    return PARAMETER_SETS[which]
 
 
 def keep_parameters(scene: bpy.types.Scene, parameters: Mapping[str, Mapping[str, Value]], which: str = "A") -> None:
     """Store a set of parameters with the scene: as text, which keeps every digit."""
-    scene[PARAMETER_SETS[which]] = json.dumps({name: dict(values) for name, values in parameters.items()})
+    scene[_key_of(which)] = json.dumps({name: dict(values) for name, values in parameters.items()})
 
 
 def show_models(

@@ -51,7 +51,7 @@ class NextStep:
 
 def next_step(scene: bpy.types.Scene) -> NextStep:
     """What a person may do next."""
-    if migration.is_newer(scene):
+    if migration.is_left_alone(scene):
         return NextStep(migration.warning(scene))
     camera = videos.active_camera(scene)
     picks = store.with_role(scene, store.PICK_ROLE)

@@ -455,7 +455,7 @@ def _doubles(objects: Sequence[bpy.types.Object], key: str, width: int) -> np.nd
 def _marker(kind: str) -> bpy.types.Mesh:
     """A ring with a spot in it, of radius 1, shared by all picks of a kind."""
     name = f"Rockfall {kind}"
-    existing = bpy.data.meshes.get(name)
+    existing = bpy.data.meshes.get((name, None))
     if existing is not None:
         return existing
     angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)

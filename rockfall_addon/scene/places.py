@@ -6,15 +6,14 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...core.camera.model import project, rays
 from ...core.errors import RockfallError
 from ...core.footage.advice import time_sigma_s
 from ...core.reconstruction.block import Block
-from ...core.reconstruction.triangulation import contact_points, pick_on_terrain
 from ...core.terrain.raycast import cast_ray
 from ...core.terrain.surface import Surface
 from ...core.vectors import Array
-from . import fingerprints, own_blocks, picks, pictures, reconstruction, store
+from ...core.workflow.first_picks import coordinate_sigma, place_clicked
+from . import fingerprints, own_blocks, picks, pictures, reconstruction, sightings, store, terrain
 
 FIRST_NAME = "B01"
 
@@ -27,9 +26,10 @@ class Place:
     ----------
     position, normal : (3,) local [m], where the block touches the terrain; the normal of the face there.
     time_s : on the common clock [s].
-    sigma_time_s, sigma_m : standard deviations of the time and of a coordinate; NaN in a free view.
+    sigma_time_s, sigma_m : standard deviations of the time and of a coordinate, the latter of the click, the camera and
+        the terrain together; NaN in a free view, infinite where the camera was not found in this picture.
     frame, pixel, sigma_px : of the picture, and the (2,) click in it; −1 and NaN in a free view.
-    ellipse : (2, 3) half axes of one standard deviation on the terrain [m].
+    ellipse : (2, 3) half axes of one standard deviation on the terrain [m], of all three.
     grazing_deg : angle between the ray and the terrain.
     warning : a sentence, empty where all is well.
     """
@@ -101,28 +101,29 @@ def in_picture(
     surface = surface_of(scene)
     frame, video_s = pictures.picture_time(scene, camera)
     pixel = np.asarray(pixel, dtype=np.float64)
-    lens, sigma_px = pictures.posed(camera, video_s), store.double(settings.sigma_px)
+    sigma_px = store.double(settings.sigma_px)
     of_centre = settings.aim == "CENTRE" if centre is None else centre
-    ground_pixel, touching = pixel, None
-    if of_centre:
-        origin, direction = rays(lens, pixel[None])
-        if np.isfinite(direction).all():
-            diameter = np.array([block_of(scene, name).diameter_m])
-            point, _ = contact_points(surface, origin, direction, diameter, normal_radius(scene))
-            if np.isfinite(point).all():
-                touching, ground_pixel = point[0], project(lens, point)[0]
-    found = pick_on_terrain(lens, ground_pixel[None], surface, sigma_px)
+    found = place_clicked(
+        sightings.view_of(camera),
+        video_s,
+        pixel,
+        sigma_px,
+        surface,
+        centre_of=block_of(scene, name) if of_centre else None,
+        sigma_terrain_m=terrain.accuracy_m(scene),
+        normal_radius_m=normal_radius(scene),
+    )
     if np.isnan(found.point[0, 0]):
         against = "If the block stands against the sky there, click where it touches the ground, with Click on: Ground."
         advice = against if of_centre else "Click on the surveyed slope."
         raise RockfallError(f"There is no terrain behind this pixel. {advice}")
     step = pictures.frame_step_s(camera)
     return Place(
-        position=found.point[0] if touching is None else touching,
+        position=found.point[0],
         normal=found.normal[0],
         time_s=pictures.common_time(camera, video_s, float(pixel[1])),
         sigma_time_s=time_sigma_s(1 / step),
-        sigma_m=float(np.sqrt(np.trace(found.covariance[0]) / 3)),
+        sigma_m=coordinate_sigma(found.covariance[0]),
         frame=frame,
         pixel=pixel,
         sigma_px=sigma_px,

@@ -4,6 +4,7 @@
 import json
 from collections.abc import Callable
 from functools import wraps
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -89,7 +90,7 @@ def update(scene: bpy.types.Scene) -> None:
 
 def remarks(scene: bpy.types.Scene) -> list[Remark]:
     """What the panels show."""
-    newer = [Remark(migration.warning(scene), "problem", "version")] if migration.is_newer(scene) else []
+    newer = [Remark(migration.warning(scene), "problem", "version")] if migration.is_left_alone(scene) else []
     return [*newer, *_troubles, *from_text(str(scene.get(store.PROBLEM, "")), "warning")]
 
 
@@ -125,6 +126,13 @@ def _of_scene(scene: bpy.types.Scene) -> list[Remark]:
     said = set_aside_words.remarks(scene)
     if not said and store.HAS_SET_ASIDE in scene:
         del scene[store.HAS_SET_ASIDE]
+    for path, count in store.linked_files(scene).items():
+        many = f"{count} objects of Rockfall are" if count > 1 else "An object of Rockfall is"
+        text = (
+            f"{many} linked from {Path(path.replace(chr(92), '/')).name or 'another file'}, and not used: Blender does "
+            "not save changes of these. Select them and choose Object > Relations > Make Local > All, or append."
+        )
+        said.append(Remark(text, "warning", "linked"))
     scale = scene.unit_settings.scale_length
     if scene.unit_settings.system != "NONE" and abs(scale - 1.0) > 1e-6 and picks.objects_of(scene):
         text = (

@@ -88,7 +88,7 @@ def show_videos(scene: bpy.types.Scene, found: list[ReadVideo], name: str = "") 
     objects = []
     for read in found:
         first = not videos.cameras(scene)
-        there = (c for c in videos.cameras(scene) if Path(str(c[store.VIDEO_FILE])) == read.video.path.resolve())
+        there = (c for c in videos.cameras(scene) if video_files.file_of(c) == read.video.path.resolve())
         camera = next(there, None) or new_videos.add_camera(scene, read.video)
         camera.name = read.entry.name
         clocks.set_clock(camera, read.clock)

@@ -14,7 +14,7 @@ def open_saved(file: Path, name: str = "") -> bpy.types.Scene:
 
     Raises
     ------
-    InputError : Blender cannot open it, it has no such scene, or a newer Rockfall has saved it.
+    InputError : Blender cannot open it, it has no such scene, or it is left alone: a newer Rockfall has saved it, or it is linked.
     """
     try:
         bpy.ops.wm.open_mainfile(filepath=str(file.absolute()))
@@ -24,6 +24,6 @@ def open_saved(file: Path, name: str = "") -> bpy.types.Scene:
     scene = bpy.data.scenes.get(name) if name else bpy.context.scene
     if scene is None:
         raise InputError(f"There is no scene {name!r} in it", file=file, advice="Save it again")
-    if migration.is_newer(scene):
+    if migration.is_left_alone(scene):
         raise InputError(migration.warning(scene), file=file)
     return scene

@@ -98,7 +98,7 @@ def _look_at_objects(scene: bpy.types.Scene) -> bool:
     for obj in scene.objects:
         held = obj.get(store.ROLE)
         role = roles.get(held, held) if isinstance(held, str) else None
-        if role not in BY_ROLE:
+        if role not in BY_ROLE or not store.is_own(obj):
             continue
         kept, values = BY_ROLE[role], dict(obj.items())
         is_whole = not any(check(values.get(key)) for key, check in kept.needed.items())

@@ -68,6 +68,22 @@ def clear(camera: bpy.types.Object, name: str) -> int:
     return count
 
 
+def view_of(camera: bpy.types.Object) -> View:
+    """An aligned video's camera with its clock.
+
+    Raises
+    ------
+    RockfallError : it is not aligned.
+    """
+    return View(
+        camera.name,
+        pictures.aligned_path(camera),
+        clocks.clock_of(camera),
+        videos.row_time_of(camera),
+        camera_paths.pose_covariance(camera),
+    )
+
+
 def seen_video(camera: bpy.types.Object, names: Collection[str]) -> SeenVideo:
     """An aligned video, with what was seen of some trajectories.
 
@@ -75,16 +91,9 @@ def seen_video(camera: bpy.types.Object, names: Collection[str]) -> SeenVideo:
     ------
     RockfallError : it is not aligned.
     """
-    view = View(
-        camera.name,
-        pictures.aligned_path(camera),
-        clocks.clock_of(camera),
-        videos.row_time_of(camera),
-        camera_paths.pose_covariance(camera),
-    )
     tables = [(name, seen_in(camera, name)) for name in names]
     parts = [Sightings(np.full(len(t), name), t.frame, t.time_s, t.pixel, t.sigma_px) for name, t in tables]
-    return SeenVideo(view, joined(Sightings, parts))
+    return SeenVideo(view_of(camera), joined(Sightings, parts))
 
 
 def _tables(camera: bpy.types.Object) -> dict[str, Array]:

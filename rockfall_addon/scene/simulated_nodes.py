@@ -21,7 +21,7 @@ HALF_AXES = "half_axes_m"
 
 def blocks_group() -> bpy.types.GeometryNodeTree:
     """The node group, made once in a file."""
-    existing = bpy.data.node_groups.get(GROUP)
+    existing = bpy.data.node_groups.get((GROUP, None))
     if existing is not None:
         return existing
     group = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")

@@ -178,7 +178,7 @@ def selected_pick(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 
 def _can_start(obj: bpy.types.Object | None) -> bool:
-    is_pick = obj is not None and obj.get(store.ROLE) == store.PICK_ROLE
+    is_pick = obj is not None and obj.get(store.ROLE) == store.PICK_ROLE and store.is_own(obj)
     return is_pick and obj.get(store.KIND) in ("release", "impact")
 
 

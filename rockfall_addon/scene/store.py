@@ -186,13 +186,30 @@ def comings() -> tuple[int, ...]:
     return _comings[0], len(bpy.data.meshes), len(bpy.data.actions), len(bpy.data.materials), len(bpy.data.node_groups)
 
 
+def is_own(obj: bpy.types.ID) -> bool:
+    """Whether a data-block is of this file: what is linked from another one, or overrides that, is not written to."""
+    return obj.library is None and obj.override_library is None
+
+
+def linked_files(scene: bpy.types.Scene) -> dict[str, int]:
+    """Paths of other files → how many objects of ours the scene shows of them."""
+    found: dict[str, int] = {}
+    for obj in scene.objects if bpy.data.libraries else ():
+        if isinstance(obj.get(ROLE), str) and not is_own(obj):
+            reference = obj if obj.library is not None else obj.override_library.reference
+            library = reference.library if reference is not None else None
+            path = library.filepath if library is not None else ""
+            found[path] = found.get(path, 0) + 1
+    return found
+
+
 def of_role(scene: bpy.types.Scene, role: str, trajectory: str | None = None) -> list[bpy.types.Object]:
     """The scene's objects of one role, all or those of a trajectory, in no order."""
     key = scene.session_uid
     if role == CAMERA_ROLE and _tables.get(key) is None:  # asked at every change: a type is read four times as quickly
-        return [o for o in scene.objects if o.type == "CAMERA" and o.get(ROLE) == role]
+        return [o for o in scene.objects if o.type == "CAMERA" and o.get(ROLE) == role and is_own(o)]
     if key not in _tables:
-        found = (o for o in scene.objects if o.get(ROLE) == role)
+        found = (o for o in scene.objects if o.get(ROLE) == role and is_own(o))
         return [o for o in found if trajectory is None or o.get(TRAJECTORY) == trajectory]
     if _tables[key] is None:
         _tables[key] = _table(scene)
@@ -203,7 +220,7 @@ def _table(scene: bpy.types.Scene) -> _Table:
     table: _Table = {}
     for obj in scene.objects:
         role = obj.get(ROLE)
-        if role is not None:
+        if isinstance(role, str) and is_own(obj):
             table.setdefault((role, None), []).append(obj)
             name = obj.get(TRAJECTORY)
             if isinstance(name, str):
@@ -214,7 +231,7 @@ def _table(scene: bpy.types.Scene) -> _Table:
 def trajectories_of(scene: bpy.types.Scene, role: str) -> set[str]:
     """The trajectories of which the scene has objects of a role."""
     if scene.session_uid not in _tables:
-        return {obj[TRAJECTORY] for obj in of_role(scene, role) if TRAJECTORY in obj}
+        return {name for obj in of_role(scene, role) if isinstance(name := obj.get(TRAJECTORY), str)}
     of_role(scene, role)
     return {name for each, name in _tables[scene.session_uid] if each == role and name is not None}
 
@@ -235,7 +252,7 @@ def has_role(scene: bpy.types.Scene, role: str) -> bool:
     """Whether the scene has an object of a role: quicker than to list them, for what is asked at every redraw."""
     if role == CAMERA_ROLE or scene.session_uid in _tables:
         return bool(of_role(scene, role))
-    return any(o.get(ROLE) == role for o in scene.objects)
+    return any(o.get(ROLE) == role and is_own(o) for o in scene.objects)
 
 
 def by_role(scene: bpy.types.Scene, *roles: str) -> list[list[bpy.types.Object]]:
@@ -243,7 +260,7 @@ def by_role(scene: bpy.types.Scene, *roles: str) -> list[list[bpy.types.Object]]
     found: dict[str, list[bpy.types.Object]] = {role: [] for role in roles}
     for obj in scene.objects:
         role = obj.get(ROLE)
-        if role in found:
+        if isinstance(role, str) and role in found and is_own(obj):
             found[role].append(obj)
     return list(found.values())
 

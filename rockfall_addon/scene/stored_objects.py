@@ -65,6 +65,13 @@ def _pose_sigmas(value: object) -> str:
     return _no_list(value, 2) or ("" if (np.array(value) >= 0).all() else BEYOND)
 
 
+def _covariance(value: object) -> str:
+    """(6, 6) of a pose, which must have an inverse."""
+    problem = numbers(36)(value)
+    matrix = np.zeros((6, 6)) if problem else np.array(value, dtype=np.float64).reshape(6, 6)
+    return problem or ("" if np.linalg.eigvalsh(matrix + matrix.T)[0] > 0 else "is no covariance")
+
+
 def _text(value: object) -> str:
     return "" if isinstance(value, str) else NO_TEXT
 
@@ -125,7 +132,7 @@ BY_ROLE: dict[str, Kept] = {
             **_poses,
             store.SOLVED: lambda value: "" if isinstance(value, (bool, int)) else "is neither true nor false",
             store.POSE_SIGMA: _pose_sigmas,
-            store.POSE_COVARIANCE: numbers(36),
+            store.POSE_COVARIANCE: _covariance,
             store.CAMERA_SHIFT: _place,
             store.RMSE: _amount,
             store.ASPECT: numbers(2, 1e-3, 1e3),

@@ -177,7 +177,10 @@ def _rows_of_keys(found: list) -> None:
     for frame, x, y, z, identifier, state in found:
         if any(number()(value) for value in (frame, x, y, z)) or not isinstance(identifier, str):
             raise ValueError
-        state.items()
+        for key, value in state.items():
+            many = 0 if key == store.TIME else 3  # what `block_keys.STATE` has
+            if (many and len(value) != many) or any(number()(one) for one in (value if many else [value])):
+                raise ValueError
 
 
 def _presets(found: list) -> None:

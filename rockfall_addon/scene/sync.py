@@ -193,7 +193,7 @@ def sync(
     undone : an undo or redo has just brought something back: no objects come or go.
     again : compute them even where nothing has changed.
     """
-    if migration.is_newer(scene):
+    if migration.is_left_alone(scene):
         return Done([], [])
     if dragging:
         with store.looking(scene):
@@ -325,8 +325,9 @@ def recompute(scene: bpy.types.Scene) -> None:
 
     When one trajectory has a problem, the others still follow.
     """
-    if migration.is_newer(scene) or scene.session_uid in _recomputing:
+    if migration.is_left_alone(scene) or scene.session_uid in _recomputing:
         return
+    set_aside.look(scene)
     _recomputing.add(scene.session_uid)  # showing what has no flights yet sets sizes, which are settings
     try:
         reconstruction.refresh(scene)

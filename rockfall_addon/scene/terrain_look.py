@@ -44,7 +44,7 @@ def apply(scene: bpy.types.Scene) -> None:
     """Show all terrain of a scene as its sliders say."""
     look = look_of(scene)
     paint(meshes(scene), look)
-    material = bpy.data.materials.get(materials.TERRAIN_MATERIAL)
+    material = bpy.data.materials.get((materials.TERRAIN_MATERIAL, None))
     if material is not None:
         materials.set_terrain_values(material, asdict(look))
 

@@ -113,7 +113,7 @@ def _remove(tile: bpy.types.Object) -> None:
 
 def _group() -> bpy.types.GeometryNodeTree:
     """Geometry nodes: the mesh of another object, unless it has no faces."""
-    existing = bpy.data.node_groups.get(GROUP)
+    existing = bpy.data.node_groups.get((GROUP, None))
     if existing is not None:
         return existing
     group = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")

@@ -326,7 +326,7 @@ def block_mesh(name: str = "Rockfall block", colour: tuple[float, float, float] 
 
     One from a file of an earlier version may have another colour: it gets this one.
     """
-    existing = bpy.data.meshes.get(name)
+    existing = bpy.data.meshes.get((name, None))
     if existing is not None:
         _colour_block(existing, colour)
         return existing

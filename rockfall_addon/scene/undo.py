@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Objects that come or go after Blender has stored its undo step belong to that step.
 
-An undo to the step before would otherwise keep collections that point to objects which are no more.
+An undo to the step before would otherwise keep collections that point to objects which are no more. Blender takes over
+what its steps do not tell apart, and crashes now and then where objects or scenes have come or gone that no step knows;
+scripts that undo in the background have to store their steps themselves (`bpy.ops.ed.undo_push`).
 """
 
 import bpy

@@ -47,8 +47,11 @@ def write_video(camera: bpy.types.Object, video: Video) -> None:
         camera.data.background_images.remove(old)
     if not is_there(video.path):  # of a project whose video has moved
         return
-    clip = bpy.data.movieclips.load(str(video.pictures[0].resolve()) if video.pictures else camera[store.VIDEO_FILE])
+    file = str(video.pictures[0].resolve()) if video.pictures else camera[store.VIDEO_FILE]
+    clip = bpy.data.movieclips.load(file)
     clip.name = camera.name
+    if bpy.data.filepath and bpy.context.preferences.filepaths.use_relative_paths:
+        clip.filepath = _relative(file)
     background = camera.data.background_images.new()
     background.source, background.clip = "MOVIE_CLIP", clip
     background.frame_method = "STRETCH"  # fills the frame to the pixel; fitting could leave a seam
@@ -69,14 +72,26 @@ def clip_of(camera: bpy.types.Object) -> bpy.types.MovieClip | None:
     return next((clip for clip in clips if clip is not None), None)
 
 
+def _relative(path: str) -> str:
+    """A path from the .blend, which goes on where both are moved; as it is on another disk of Windows."""
+    try:
+        return bpy.path.relpath(path)
+    except ValueError:
+        return path
+
+
 def file_of(camera: bpy.types.Object) -> Path:
-    """The video file, which may have moved; where Blender was told of another place, that."""
+    """The video's file, for all that reads or names it: that of the clip, which is what a person sees.
+
+    Blender keeps its path, moves it with the .blend where it is relative, and finds it again. What was stored when the
+    video was added holds where there is no clip, or where its file is not there.
+    """
     stored = Path(bpy.path.abspath(str(camera.get(store.VIDEO_FILE, ""))))
     clip = clip_of(camera)
-    if not is_there(stored) and clip is not None:
-        elsewhere = Path(bpy.path.abspath(clip.filepath))
-        if elsewhere.is_file():
-            return sequence_beside(elsewhere) if clip.source == "SEQUENCE" else elsewhere
+    if clip is not None and clip.source in ("MOVIE", "SEQUENCE"):
+        shown = Path(bpy.path.abspath(clip.filepath, library=clip.library))
+        if shown.is_file():
+            return sequence_beside(shown.resolve()) if clip.source == "SEQUENCE" else shown.resolve()
     return stored
 
 
@@ -109,7 +124,7 @@ def video_of(camera: bpy.types.Object) -> Video:
 
     Raises
     ------
-    RockfallError : the file has moved, or is none any more.
+    RockfallError : the file has moved, is none any more, or one of another size.
     """
     path = file_of(camera)
     if not is_there(path):
@@ -117,7 +132,14 @@ def video_of(camera: bpy.types.Object) -> Video:
             f"The video {path.name} is not at {path.parent} any more. Nothing is lost: use Find the File in the "
             "Videos panel."
         )
-    return opened(path, sequence_rate_of(camera))
+    video = opened(path, sequence_rate_of(camera))
+    if (video.width, video.height) != videos.size_of(camera):
+        (width, height), size = videos.size_of(camera), f"{video.width} × {video.height} px"
+        raise RockfallError(
+            f"The clip of {camera.name} shows {path.name}, which has {size}; what was marked is of {width} × {height} "
+            "px. Use Find the File in the Videos panel, or add it as another video."
+        )
+    return video
 
 
 def picture(camera: bpy.types.Object, index: int) -> Image:

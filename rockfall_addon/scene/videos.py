@@ -24,6 +24,7 @@ def is_video(obj: bpy.types.Object | None) -> bool:
         obj is not None
         and obj.type == "CAMERA"
         and obj.get(store.ROLE) == store.CAMERA_ROLE
+        and store.is_own(obj)
         and store.VIDEO_TIMES in obj
     )
 

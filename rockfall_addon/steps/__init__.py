@@ -9,7 +9,7 @@ import bpy
 from .. import view
 from ..scene import comparison_settings, graph_settings, model_parameters, motion_settings, settings
 from ..view import toolbar
-from ..view.reporting import leave_newer_alone
+from ..view.reporting import answer_in_words, leave_newer_alone
 
 STEPS = (
     "start",
@@ -70,6 +70,7 @@ def register() -> None:
         _registered.append(part)
         for cls in getattr(part, "CLASSES", ()):
             leave_newer_alone(cls)
+            answer_in_words(cls)
             bpy.utils.register_class(cls)
         if hasattr(part, "register"):
             part.register()

@@ -152,7 +152,7 @@ def active_pick(context: bpy.types.Context) -> bpy.types.Object | None:
     """The selected pick."""
     layer = context.view_layer
     obj = layer.objects.active if layer is not None else None
-    if obj is None or obj.get(store.ROLE) != store.PICK_ROLE or store.TRAJECTORY not in obj:
+    if obj is None or obj.get(store.ROLE) != store.PICK_ROLE or not store.is_own(obj) or store.TRAJECTORY not in obj:
         return None
     return obj
 

@@ -100,6 +100,8 @@ def _largest_view(screen: bpy.types.Screen) -> bpy.types.Area | None:
 
 def fit_footage(scene: bpy.types.Scene, screen: bpy.types.Screen) -> None:
     """Make the active footage as large as each camera view allows beside its toolbar, sidebar and header."""
+    if bpy.app.background:
+        return  # where nothing is ever drawn, views have no size, and Blender crashes when it is asked for
     camera = videos.active_camera(scene)
     for area, region in camera_views(screen):
         view = area.spaces.active.region_3d

@@ -2,16 +2,34 @@
 """A random walk over what a person can do to a scene: every operator of ours, what Blender does to objects, scenes and
 collections, undo and redo, saving and loading. After each step no pick is lost and nothing has gone wrong.
 
-Used in Blender as a module (test_random_walk.py) and in a window (tests/interface/walk_of_operators.py).
+Every step is stored for undo, as those of a person are. Blender itself (5.2, also without Rockfall) crashes now and
+then in an undo after a script has made or removed data-blocks that no stored step knows: of walks that store two steps
+of five, about every second one ends so.
+
+Used in Blender as a module, in a process of its own (test_random_walk.py, scripts/fuzzing/walk_blender.py), and in a
+window (tests/interface/walk_of_operators.py).
+
+    python tests/blender/random_walk.py SEED STEPS FOLDER
+    blender --background --factory-startup --addons bl_ext.user_default.rockfall \\
+        --python tests/blender/random_walk.py -- SEED STEPS FOLDER
 """
 
 import contextlib
+import faulthandler
+import importlib
+import os
 import random
+import shutil
+import sys
+import traceback
 from collections.abc import Callable
 from math import cos, sin
 from pathlib import Path
 
 import bpy
+
+VIDEO = Path(__file__).resolve().parents[1] / "data" / "videos" / "constant.mp4"
+NAME = "bl_ext.user_default.rockfall" if bpy.app.binary_path else "rockfall"
 
 DEMO = ("load_demo", "load_footage_demo", "open_project")
 SLOW = {
@@ -24,6 +42,12 @@ REPLACES = {"import_picks", "load_demo", "open_project", "load_footage_demo"}
 """Operators that put other picks into the scene."""
 FILES = {"filepath", "directory"}
 UNDO_STEPS = 12
+KEPT = (
+    "rockfall_kind", "rockfall_status", "rockfall_normal", "rockfall_sigma_time_s", "rockfall_sigma_position_m",
+    "rockfall_angular_velocity_radps", "rockfall_extra",
+)  # fmt: skip
+"""What a pick holds beside its trajectory, time and place."""
+MOST_THINGS = 400
 FEW = 4
 """With fewer picks than this, a table is imported."""
 
@@ -41,6 +65,7 @@ class Walk:
     part : a module of the registered package by its name.
     slow : whether operators that take long belong to it, too.
     first_the_step : whether, as in a window, the undo step is stored before anything looks at what was done.
+    can_disable : whether the extension is disabled and enabled again on the way.
     """
 
     def __init__(
@@ -51,6 +76,7 @@ class Walk:
         *,
         slow: bool = False,
         first_the_step: bool = False,
+        can_disable: bool = False,
     ) -> None:
         self.random, self.folder, self.part = random.Random(seed), folder, part
         self.operators = sorted(name for name in dir(bpy.ops.rockfall) if not name.startswith("_"))
@@ -62,8 +88,12 @@ class Walk:
             (2, self.delete_collection), (2, self.new_scene), (3, self.delete_scene), (3, self.other_scene),
             (3, self.duplicate), (3, self.save), (2, self.save_and_load), (3, self.go_to_frame), (1, self.frame_rate),
             (3, self.setting), (1, self.clear_animation), (3, self.select), (1, self.parent), (1, self.purge),
-            (1, self.link_elsewhere), (1, self.unlink), (1, self.edit_mode),
+            (1, self.link_elsewhere), (1, self.unlink), (1, self.edit_mode), (2, self.append), (1, self.append_scene),
+            (1, self.link_file), (1, self.make_local), (1, self.unit_scale), (1, self.move_file),
+            (1, self.rename_video),
         ]  # fmt: skip
+        if can_disable:
+            self.actions.append((2, self.disable_and_enable))
         self.before: Picks = {}
         self.may_go: set[str] | None = set()
         self.may_change = False
@@ -75,7 +105,12 @@ class Walk:
     def begin(self) -> None:
         """A slope with three runs, which is the first step that can be undone to."""
         write_project(self.folder)
+        self.home = self.folder / "site"
+        self.home.mkdir()
+        shutil.copy(VIDEO, self.home / "video.mp4")
         assert bpy.ops.rockfall.open_project(filepath=str(self.folder / "project.toml")) == {"FINISHED"}
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.folder / "other.blend"), copy=True)
+        bpy.ops.rockfall.add_video(filepath=str(self.home / "video.mp4"))
         bpy.ops.ed.undo_push(message="project")
         self.history, self.place = [picks_of_all()], 0
 
@@ -249,7 +284,7 @@ class Walk:
 
     def rename(self) -> str:
         kinds = ("objects", "collections", "meshes", "materials", "actions", "node_groups", "cameras", "worlds")
-        held = list(getattr(bpy.data, self.random.choice(kinds)))
+        held = [each for each in getattr(bpy.data, self.random.choice(kinds)) if each.library is None]
         if not held:
             return "nothing"
         each = self.random.choice(held)
@@ -259,9 +294,10 @@ class Walk:
 
     def delete_collection(self) -> str:
         """As the outliner does it: what was in it goes to the scene; or with all that is in it."""
-        if not bpy.data.collections:
+        held = [each for each in bpy.data.collections if each.library is None]
+        if not held:
             return "nothing"
-        each = self.random.choice(list(bpy.data.collections))
+        each = self.random.choice(held)
         name = each.name
         if self.random.random() < 0.6:
             for scene in bpy.data.scenes:
@@ -315,14 +351,89 @@ class Walk:
         return f"duplicate {obj.name}"
 
     def save(self) -> str:
-        bpy.ops.wm.save_as_mainfile(filepath=str(self.folder / "walk.blend"))
+        bpy.ops.wm.save_as_mainfile(filepath=str(self.home / "walk.blend"))
         return "save"
 
     def save_and_load(self) -> str:
         self.save()
-        bpy.ops.wm.open_mainfile(filepath=str(self.folder / "walk.blend"), load_ui=False)
-        self.history, self.place = [], -1
+        self.load()
         return "save and load"
+
+    def load(self) -> None:
+        bpy.ops.wm.open_mainfile(filepath=str(self.home / "walk.blend"), load_ui=False)
+        self.history, self.place = [], -1
+
+    def move_file(self) -> str:
+        """The .blend and the video beside it come to another folder; the old ones are no more."""
+        self.save()
+        moved = self.folder / f"site {len(self.done)}"
+        self.home = self.home.rename(moved)
+        self.load()
+        return "move the file"
+
+    def rename_video(self) -> str:
+        """The file of the video has another name, or its own again."""
+        here, there = self.home / "video.mp4", self.home / "moved video.mp4"
+        (here if here.exists() else there).rename(there if here.exists() else here)
+        return "rename the video"
+
+    def append(self) -> str:
+        """Objects or a collection of another file, some with the same ids and names."""
+        if sum(map(len, (bpy.data.objects, bpy.data.meshes))) > MOST_THINGS:
+            return "nothing"
+        kind = self.random.choice(["objects", "collections"])
+        with bpy.data.libraries.load(str(self.folder / "other.blend")) as (there, _):
+            names = sorted(getattr(there, kind))
+        folder = str(self.folder / "other.blend" / {"objects": "Object", "collections": "Collection"}[kind]) + os.sep
+        chosen = self.random.sample(names, min(len(names), self.random.choice([1, 3])))
+        bpy.ops.wm.append(directory=folder, filename=chosen[0], files=[{"name": name} for name in chosen])
+        bpy.context.view_layer.update()
+        self.may_change = True  # other picks of a run are before and after
+        return f"append {kind} {', '.join(chosen)}"
+
+    def append_scene(self) -> str:
+        if len(bpy.data.scenes) > 3:
+            return "nothing"
+        folder = str(self.folder / "other.blend" / "Scene") + os.sep
+        bpy.ops.wm.append(directory=folder, filename="Scene")
+        return "append a scene"
+
+    def link_file(self) -> str:
+        """A collection of another file, which is not to be written to."""
+        folder = str(self.folder / "other.blend" / "Collection") + os.sep
+        bpy.ops.wm.link(directory=folder, filename="Rockfall", instance_collections=self.random.random() < 0.5)
+        bpy.context.view_layer.update()
+        return "link a collection"
+
+    def make_local(self) -> str:
+        if not bpy.data.libraries:
+            return "nothing"
+        if self.random.random() < 0.5:
+            bpy.data.libraries.remove(self.random.choice(list(bpy.data.libraries)))
+            return "remove a library"
+        for obj in bpy.context.view_layer.objects:
+            obj.select_set(obj.library is not None)
+        with contextlib.suppress(RuntimeError):
+            bpy.ops.object.make_local(type=self.random.choice(["SELECT_OBJECT", "ALL"]))
+        bpy.context.view_layer.update()
+        self.may_change = True
+        return "make local"
+
+    def unit_scale(self) -> str:
+        scene = self.random.choice(list(bpy.data.scenes))
+        scene.unit_settings.scale_length = self.random.choice([1.0, 0.01, 0.3048])
+        return f"unit scale {scene.unit_settings.scale_length}"
+
+    def disable_and_enable(self) -> str:
+        """All stays as it is, to the last bit."""
+        before = stored()
+        disable()
+        without = picks_of_all()
+        assert stored() == before, "disabling changes what is stored"
+        enable()
+        assert picks_of_all() == without, "enabling changes picks"
+        self.pushes = False
+        return "disable and enable"
 
     def go_to_frame(self) -> str:
         frame = self.random.choice([0, 1, 33, 250, -5])
@@ -415,7 +526,7 @@ class Walk:
         return self.random.choice(found) if found else None
 
     def any_object(self) -> bpy.types.Object | None:
-        found = list(bpy.context.scene.objects)
+        found = [obj for obj in bpy.context.scene.objects if obj.library is None]
         return self.random.choice(found) if found else None
 
 
@@ -449,7 +560,7 @@ def write_project(folder: Path) -> None:
 
 
 def ours(role: str) -> list[bpy.types.Object]:
-    return [obj for obj in bpy.context.scene.objects if obj.get("rockfall_role") == role]
+    return [obj for obj in bpy.context.scene.objects if obj.get("rockfall_role") == role and obj.library is None]
 
 
 def picks_of_all() -> Picks:
@@ -459,10 +570,29 @@ def picks_of_all() -> Picks:
             obj["rockfall_trajectory"],
             float(obj["rockfall_time_s"]).hex(),
             tuple(value.hex() for value in obj["rockfall_position_m"]),
+            tuple(plain(obj.get(key)) for key in KEPT),
         )
         for scene in bpy.data.scenes
         for obj in scene.objects
-        if obj.get("rockfall_role") == "pick" and "rockfall_id" in obj
+        if obj.get("rockfall_role") == "pick" and "rockfall_id" in obj and obj.library is None
+    }
+
+
+def plain(value: object) -> str:
+    """What an ID property holds, to the last bit."""
+    for way in ("to_dict", "to_list"):
+        if hasattr(value, way):
+            value = getattr(value, way)()
+    return repr(value)
+
+
+def stored() -> dict[tuple[str, str], str]:
+    """All that we have written into objects and scenes of this file."""
+    return {
+        (each.name_full, key): plain(value)
+        for each in (*bpy.data.objects, *bpy.data.scenes)
+        for key, value in each.items()
+        if key.startswith("rockfall_") and each.library is None
     }
 
 
@@ -477,3 +607,60 @@ def different(before: Picks, after: Picks) -> list[tuple]:
     return [(key, before.get(key), after.get(key)) for key in {*before, *after} if before.get(key) != after.get(key)][
         :3
     ]
+
+
+def enable() -> None:
+    """As ticking the box in the preferences does."""
+    if bpy.app.binary_path:
+        import addon_utils
+
+        assert addon_utils.enable(NAME, default_set=True, refresh_handled=True) is not None
+        return
+    if NAME not in bpy.context.preferences.addons:
+        bpy.context.preferences.addons.new().module = NAME
+    importlib.import_module(NAME).register()
+
+
+def disable() -> None:
+    if bpy.app.binary_path:
+        import addon_utils
+
+        addon_utils.disable(NAME, refresh_handled=True)
+    else:
+        importlib.import_module(NAME).unregister()
+
+
+def main(seed: int, steps: int, folder: Path) -> int:
+    """Walk; what is done is written to ``steps.txt`` before and after it is, as Blender may end at any of it."""
+    faulthandler.enable()
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    if not hasattr(bpy.types, "ROCKFALL_PT_installation"):
+        enable()
+    walk = Walk(
+        seed,
+        folder,
+        lambda name: importlib.import_module(f"{NAME}.{name}"),
+        first_the_step=bool(seed % 2),
+        can_disable=True,
+    )
+    walk.begin()
+    with (folder / "steps.txt").open("w", encoding="utf-8") as told:
+        try:
+            for number in range(steps):
+                print(number, end=" ", file=told, flush=True)
+                print(walk.step(), file=told, flush=True)
+                walk.check()
+        except BaseException:  # noqa: BLE001 - all of it is to be seen
+            traceback.print_exc()
+            return 1
+    kinds = {name.split()[0].split("(")[0] for name in walk.done}
+    print(f"{len(walk.done)} steps of {len(kinds)} kinds")
+    return 0
+
+
+if __name__ == "__main__":
+    given = sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else sys.argv[1:]
+    code = main(int(given[0]), int(given[1]), Path(given[2]))
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)  # a regular exit can crash after GPU work

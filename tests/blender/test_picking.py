@@ -72,6 +72,13 @@ def picks_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return sorted(found, key=lambda obj: obj["rockfall_time_s"])
 
 
+def exact(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
+    """A camera and a terrain without errors of their own."""
+    camera["rockfall_pose_covariance"] = (1e-14 * np.eye(6)).ravel().tolist()
+    camera["rockfall_pose_sigma"] = [0.0] * len(camera["rockfall_pose_sigma"])
+    scene.rockfall_terrain.accuracy_m = 1e-4
+
+
 def pick(scene: bpy.types.Scene, part, frame: int, pixel: np.ndarray, name: str = "B10", **how) -> bpy.types.Object:
     places, editing = part("rockfall_addon.scene.places"), part("rockfall_addon.steps.picking.editing")
     scene.frame_set(frame)
@@ -86,6 +93,7 @@ def test_a_pixel_of_the_ground_is_the_point_of_the_ground(site, part, impacts) -
     """A true contact point, projected by hand, is found again."""
     places = part("rockfall_addon.scene.places")
     camera, poses = camera_of(site, part), rows("camera.csv")
+    exact(site, camera)
     for row in impacts[:5]:
         frame = round(float(row["time_s"]) * 30)
         site.frame_set(frame)
@@ -101,6 +109,12 @@ def test_a_pixel_of_the_ground_is_the_point_of_the_ground(site, part, impacts) -
         assert place.sigma_time_s == pytest.approx(1 / 30 / np.sqrt(12), rel=1e-6)
         axes = np.linalg.norm(place.ellipse, axis=1)
         assert 0.03 < axes[1] <= axes[0] < 0.2, "a pixel is 4 cm wide there"
+        away = np.linalg.norm(truth - local(pose, "x_m", "y_m", "z_m"))
+        known = camera.pop("rockfall_pose_covariance")
+        across = np.linalg.norm(places.in_picture(site, camera, pixel, "B10", centre=False).ellipse, axis=1)[1]
+        usual = away * np.hypot(np.radians(0.1), 0.002)  # of a camera of which nothing is known
+        assert across == pytest.approx(np.hypot(usual, axes[1]), rel=0.1)
+        camera["rockfall_pose_covariance"] = list(known)
 
 
 def test_the_middle_of_the_block_is_a_radius_from_the_ground(site, part, impacts) -> None:
@@ -188,6 +202,7 @@ def test_grazing_rays_are_warned_of(part) -> None:
     camera = new_videos.add_video(scene, FOOTAGE / "footage.mp4")
     lens = part("core.camera.model").look_at(1280, 720, (0, -60, 2), (0, 0, 0), focal_px=1000)
     camera_paths.set_camera_path(scene, camera, part("core.camera.path").fixed(lens))
+    exact(scene, camera)
     place = places.in_picture(scene, camera, np.array([640.0, 360.0]), "B01", centre=False)
     assert place.grazing_deg == pytest.approx(np.degrees(np.arctan2(2, 60)), abs=1e-6)
     assert "grazes the terrain at 1.9°" in place.warning

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Videos in the scene: their pictures, their files, what is said of them."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -145,6 +146,38 @@ def test_file_moved(part: Part, tmp_path: Path) -> None:
     assert part("rockfall_addon.scene.video_times").events_of(camera) == {1: 0.4}
     assert number_in(video_files.picture(camera, 12)) == 12
     assert len(bpy.data.movieclips) == 1
+
+
+def test_a_file_that_is_moved_with_its_video_takes_that_one(part: Part, tmp_path: Path) -> None:
+    """The copy of a site reads its own video, though the old one is still there; in all that reads it."""
+    new_videos, videos = part("rockfall_addon.scene.new_videos"), part("rockfall_addon.scene.videos")
+    video_files = part("rockfall_addon.scene.video_files")
+    site, copy = tmp_path / "site", tmp_path / "copy ü"
+    site.mkdir()
+    (site / "video.mp4").write_bytes((DATA / "constant.mp4").read_bytes())
+    bpy.ops.wm.save_as_mainfile(filepath=str(site / "site.blend"))
+    camera = new_videos.add_video(scene(), site / "video.mp4")
+    assert video_files.clip_of(camera).filepath == "//video.mp4"
+    bpy.ops.wm.save_as_mainfile(filepath=str(site / "site.blend"))
+    shutil.copytree(site, copy)
+    bpy.ops.wm.open_mainfile(filepath=str(copy / "site.blend"))
+    (camera,) = videos.cameras(scene())
+    assert Path(camera["rockfall_video_file"]).parent == site, "what was stored is the other one"
+    inputs = part("rockfall_addon.scene.design_sheet")._inputs(scene())
+    paths = {video_files.file_of(camera), video_files.video_of(camera).path, inputs[f"video {camera.name}"]}
+    assert paths == {(copy / "video.mp4").resolve()}
+    (copy / "video.mp4").unlink()
+    assert video_files.file_of(camera) == site / "video.mp4"
+    bpy.data.movieclips.remove(video_files.clip_of(camera))
+    assert video_files.file_of(camera) == site / "video.mp4"
+
+
+def test_a_clip_of_another_size_is_refused(part: Part, tmp_path: Path) -> None:
+    video_files = part("rockfall_addon.scene.video_files")
+    camera = add(part, "constant.mp4")
+    video_files.clip_of(camera).filepath = str(DATA / "rotated.mov")
+    with pytest.raises(part("core.errors").RockfallError, match=r"what was marked is of .* px\. Use Find the File"):
+        video_files.picture(camera, 0)
 
 
 @pytest.mark.parametrize(

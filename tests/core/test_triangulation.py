@@ -10,6 +10,7 @@ from rockfall.core.errors import InputError
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.triangulation import epipolar_curve, pick_on_terrain, triangulate
 from rockfall.core.terrain.surface import Surface
+from scipy.spatial.transform import Rotation
 
 GROUND = Surface(
     np.array([[-500.0, -500, 0], [500, -500, 0], [500, 500, 0], [-500, 500, 0]]),
@@ -119,3 +120,73 @@ def test_a_pixel_that_the_lens_cannot_see_has_no_ray() -> None:
     with pytest.raises(InputError) as caught:
         epipolar_curve(narrow, np.array([5.0, 5.0]), CAMERAS[1], 1.0, 100.0)
     assert str(caught.value) == "The pixel is outside of what the lens can see, so that it has no ray."
+
+
+SLOPE = Surface(
+    np.array([[-500.0, -500, -150], [500, -500, 150], [500, 500, 150], [-500, 500, -150]]),
+    np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32),
+    GlobalShift(),
+    "slope",
+)
+SPACE = np.diag([0.002, 0.001, 0.003, 0.2, 0.1, 0.3])
+TURNED = np.linalg.qr(np.random.Generator(np.random.MT19937(4)).normal(size=(6, 6)))[0]
+POSE = SPACE @ (0.6 * np.eye(6) + 0.4 * TURNED @ np.diag([2.0, 1, 1, 0.5, 0.2, 0.1]) @ TURNED.T) @ SPACE
+"""Of rotation and position, which are correlated, as those of a camera that was solved from pairs."""
+DRAWS = 40_000
+
+
+def drawn_poses(camera, rng):
+    """Poses of a camera whose errors have the covariance POSE: turned about the axes of the camera, and moved."""
+    errors = rng.multivariate_normal(np.zeros(6), POSE, size=DRAWS)
+    turned = Rotation.from_rotvec(errors[:, :3]).as_matrix() @ camera.rotation
+    return camera.position + errors[:, 3:], turned
+
+
+def on_plane(camera, position, rotation, pixel, height):
+    """Where rays through pixels meet the plane of SLOPE that was raised along its normal; by hand, with no lens."""
+    seen = np.column_stack([(pixel - [camera.cx, camera.cy]) / [camera.fx, camera.fy], np.ones(len(pixel))])
+    way = np.einsum("nji,nj->ni", rotation, seen)
+    normal = np.array([-0.3, 0.0, 1.0]) / np.sqrt(1.09)
+    along = (height - position @ normal) / (way @ normal)
+    return position + along[:, None] * way
+
+
+def test_the_covariance_on_the_terrain_holds_the_camera_and_the_terrain():
+    """Against draws of clicks, poses and heights, by the geometry of a plane."""
+    camera = look_at(2000, 1000, (30, -100, 60), (0, 0, 0), focal_px=1500.0)
+    rng = np.random.Generator(np.random.MT19937(11))
+    pixel, sigma_px, sigma_terrain = np.array([700.0, 420.0]), 3.0, 0.15
+    found = pick_on_terrain(camera, pixel[None], SLOPE, sigma_px, pose_covariance=POSE, sigma_terrain_m=sigma_terrain)
+    upward = 1 / np.sqrt(1.09)
+    height = sigma_terrain * (upward * rng.normal(size=DRAWS) + rng.normal(size=DRAWS))  # common to all, and smooth
+    clicks = pixel + sigma_px * rng.normal(size=(DRAWS, 2))
+    draws = on_plane(camera, *drawn_poses(camera, rng), clicks, height)
+    spread = np.cov(draws.T)
+    np.testing.assert_allclose(found.covariance[0], spread, atol=0.025 * np.trace(spread))
+    exact = pick_on_terrain(camera, pixel[None], SLOPE, sigma_px).covariance[0]
+    assert np.trace(exact) < 0.5 * np.trace(spread)  # the click alone is far from the truth
+    half = found.ellipse[0]
+    normal = np.array([-0.3, 0.0, 1.0]) * upward
+    along = np.eye(3) - np.outer(normal, normal)
+    np.testing.assert_allclose(half.T @ half, along @ spread @ along, atol=0.025 * np.trace(spread))
+
+
+def test_the_covariance_in_space_holds_the_cameras():
+    point = np.array([[3.0, -2.0, 4.0]])
+    rng = np.random.Generator(np.random.MT19937(12))
+    sigma = np.array([0.5, 1.0])[:, None]
+    cameras = [CAMERAS[0], CAMERAS[2]]
+    truth = [project(camera, point) for camera in cameras]
+    found = triangulate(cameras, np.stack(truth), sigma, pose_covariances=[POSE, POSE])
+    # A pose that is off moves the pixels: those that the solved camera would need, to see what the true one sees.
+    pixels = np.stack(
+        [
+            project(camera, np.repeat(point, DRAWS, axis=0), position=place, rotation=turn)
+            for camera in cameras
+            for place, turn in [drawn_poses(camera, rng)]
+        ]
+    )
+    draws = triangulate(cameras, pixels + sigma[:, :, None] * rng.normal(size=pixels.shape), sigma).point
+    spread = np.cov(draws.T)
+    np.testing.assert_allclose(found.covariance[0], spread, atol=0.025 * np.trace(spread))
+    assert np.trace(triangulate(cameras, np.stack(truth), sigma).covariance[0]) < 0.5 * np.trace(spread)

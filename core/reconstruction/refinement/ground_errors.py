@@ -63,6 +63,15 @@ def terrain_tilt(sigma_terrain_m: float, across_m: Array) -> Array:
     return np.asarray(np.sqrt(2.0) * slope)  # about both axes
 
 
+def normal_variance(sigma_terrain_m: float, normal: Array) -> Array:
+    """(n,) variance of the distance along normals (n, 3) between a terrain and what it is of [m²].
+
+    sigma_terrain_m : as of `ground_errors`: a height common to all of the terrain, and smooth errors beside.
+    """
+    upward = np.nan_to_num(normal[:, 2], nan=1.0)
+    return np.asarray(sigma_terrain_m**2 * (upward**2 + 1.0))
+
+
 def ground_errors(place: Array, normal: Array, contact_m: Array, sigma_terrain_m: float) -> GroundErrors:
     """Errors at places (g, 3) with terrain normals (g, 3).
 

@@ -32,8 +32,6 @@ SHAPE, ROUGHNESS = 0.1, 0.25
 SPACINGS, LEAST_TERRAIN_M, MOST_TERRAIN_M = 0.5, 0.02, 0.2
 """The accuracy of a terrain for which none is given, in parts of its point spacing, and its limits [m]: those of
 terrestrial scans, which have centimetres between points, and of airborne ones, which have decimetres."""
-SIGMA_POSE_DEG, SIGMA_PLACE = 0.1, 0.002
-"""Of a camera's angles, and of its place in parts of the distance, where its pose is given without a covariance."""
 READOUT_S, SIGMA_READOUT_S = 0.015, 0.009
 """Mean and standard deviation of the readout of phones and cameras, which is from 0 to 30 ms."""
 
@@ -260,11 +258,8 @@ def _whitening(views: tuple[View, ...], middle: Array) -> Array:
     """(v, 6, 6) of the poses' covariances, or of what is usual at such a distance from the motion."""
     result = np.zeros((len(views), 6, 6))
     for i, view in enumerate(views):
-        covariance = view.pose_covariance
-        if covariance is None:
-            place = SIGMA_PLACE * max(float(norm(middle - view.path.reference.position)), 1e-3)
-            covariance = np.diag(np.repeat([np.radians(SIGMA_POSE_DEG) ** 2, place**2], 3))
-        result[i] = np.linalg.inv(np.linalg.cholesky(np.asarray(covariance, dtype=np.float64)))
+        covariance = view.solved_covariance(float(norm(middle - view.path.reference.position)))
+        result[i] = np.linalg.inv(np.linalg.cholesky(covariance))
     return result
 
 

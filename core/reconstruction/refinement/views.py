@@ -11,6 +11,9 @@ from ...footage.clock import Clock
 from ...georeference import GlobalShift
 from ...vectors import Array, Indices, Mask, Names
 
+SIGMA_POSE_DEG, SIGMA_PLACE = 0.1, 0.002
+"""Of a camera's angles, and of its place in parts of the distance, where its pose is given without a covariance."""
+
 
 @dataclass(frozen=True, eq=False)
 class View:
@@ -46,6 +49,30 @@ class View:
     def exposed_at(self, time_s: Array, pixel: Array) -> Array:
         """(m,) when the rows of pixels (m, 2) of pictures at video times (m,) were exposed, on the common clock [s]."""
         return self.clock.to_common(time_s) + (self.row_time_s or 0.0) * (pixel[:, 1] - self.path.reference.height / 2)
+
+    def solved_covariance(self, distance_m: float) -> Array:
+        """(6, 6) of the solved pose; where it is not known, what is usual at such a distance from what is seen [m]."""
+        if self.pose_covariance is not None:
+            return np.asarray(self.pose_covariance, dtype=np.float64)
+        place = SIGMA_PLACE * max(distance_m, 1e-3)
+        return np.diag(np.repeat([np.radians(SIGMA_POSE_DEG) ** 2, place**2], 3))
+
+    def covariance_at(self, video_s: float, distance_m: float) -> Array:
+        """(6, 6) of the pose in a picture: rotation vector [rad] about the axes of the camera there, and position [m].
+
+        That of the solved pose, turned with the camera, and what the pose of this picture is off from that one;
+        infinite where this is not known.
+
+        Parameters
+        ----------
+        video_s : video time of the picture [s].
+        distance_m : from the camera to what is seen.
+        """
+        path = self.path
+        turn = np.eye(6)
+        turn[:3, :3] = path.poses_at([video_s])[1][0] @ path.reference.rotation.T
+        own = [np.interp(video_s, path.time_s, each) for each in (path.sigma_rotation, path.sigma_position_m)]
+        return turn @ self.solved_covariance(distance_m) @ turn.T + np.diag(np.repeat(np.square(own), 3))
 
     def in_shift(self, shift: GlobalShift) -> "View":
         """The same view in the local frame of another shift."""

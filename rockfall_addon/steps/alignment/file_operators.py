@@ -13,6 +13,7 @@ from ...scene import alignment, pairs, videos
 from ...view.from_file import FromFile
 from ...view.of_video import OfVideo, has_solved, has_video
 from ...view.reporting import possible, reported
+from ...view.to_file import asked_file
 from . import files
 
 
@@ -68,7 +69,8 @@ class ROCKFALL_OT_export_pairs(_IntoFile, bpy.types.Operator):
         return possible(cls, pairs.complete_of(videos.active_camera(context.scene)), "There are no complete pairs")
 
     def write(self, scene: bpy.types.Scene, camera: bpy.types.Object) -> str:
-        return f"{files.export_pairs(scene, camera, self.filepath)} pairs written to {Path(self.filepath).name}"
+        path = asked_file(self.filepath)
+        return f"{files.export_pairs(scene, camera, path)} pairs written to {path.name}"
 
 
 class ROCKFALL_OT_import_camera(OfVideo, FromFile, bpy.types.Operator):
@@ -104,7 +106,7 @@ class ROCKFALL_OT_export_camera(_IntoFile, bpy.types.Operator):
         return has_solved(cls, context, "The camera is not solved yet")
 
     def write(self, scene: bpy.types.Scene, camera: bpy.types.Object) -> str:
-        return f"Written: {', '.join(files.export_camera(scene, camera, self.filepath))}"
+        return f"Written: {', '.join(files.export_camera(scene, camera, asked_file(self.filepath)))}"
 
 
 CLASSES = (

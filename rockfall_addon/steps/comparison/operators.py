@@ -10,6 +10,7 @@ from ....core.impact_models.registry import MODELS, find_model
 from ...scene import model_parameters, models, store
 from ...view.parameters import OfModel
 from ...view.reporting import possible, reported
+from ...view.to_file import asked_file
 
 
 class ROCKFALL_OT_compare_model(OfModel, bpy.types.Operator):
@@ -81,8 +82,9 @@ class ROCKFALL_OT_save_parameters(bpy.types.Operator, ExportHelper):
         scene = context.scene
         own = models.parameters_of(scene, self.which)
         chosen = [name for name in models.ORDER if name in scene.rockfall_comparison.models]
-        write_parameters({name: MODELS[name].settings(own.get(name)) for name in chosen}, self.filepath)
-        self.report({"INFO"}, f"Parameters of {len(chosen)} models in {self.filepath}.")
+        path = asked_file(self.filepath)
+        write_parameters({name: MODELS[name].settings(own.get(name)) for name in chosen}, path)
+        self.report({"INFO"}, f"Parameters of {len(chosen)} models in {path}.")
         return {"FINISHED"}
 
 

@@ -72,7 +72,7 @@ def caption_group(align: str, with_number: bool) -> bpy.types.GeometryNodeTree:
     A text without a number has a group of its own, which does not look at the time and so is not made anew.
     """
     name = f"Rockfall caption {align.lower()}{' number' if with_number else ''}"
-    existing = bpy.data.node_groups.get(name)
+    existing = bpy.data.node_groups.get((name, None))
     if existing is not None:
         return existing
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")

@@ -41,7 +41,7 @@ def _cycles(scene: bpy.types.Scene, samples: int) -> None:
     cycles.samples = samples
     cycles.use_adaptive_sampling = cycles.use_denoising = False
     cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = cycles.transmission_bounces = 0
-    cycles.transparent_max_bounces = MOST_LAYERS if bpy.data.materials.get(materials.PATH_MATERIAL) else 0
+    cycles.transparent_max_bounces = MOST_LAYERS if bpy.data.materials.get((materials.PATH_MATERIAL, None)) else 0
     cycles.use_auto_tile = False
     for material in bpy.data.materials:
         if material.name.startswith("Rockfall"):

@@ -49,7 +49,7 @@ def impact_marks(scene: bpy.types.Scene, radius_m: float) -> bpy.types.Object | 
 
 def until_now_group() -> bpy.types.GeometryNodeTree:
     """Geometry nodes: what has a display time later than the scene's is not there yet."""
-    existing = bpy.data.node_groups.get(GROUP)
+    existing = bpy.data.node_groups.get((GROUP, None))
     if existing is not None:
         return existing
     group = bpy.data.node_groups.new(GROUP, "GeometryNodeTree")

@@ -105,7 +105,7 @@ def _since_release(obj: bpy.types.Object) -> Array:
 def _thin_trails(group: bpy.types.GeometryNodeTree, opacity: float) -> bpy.types.GeometryNodeTree:
     """The group of the flights' trails, with fewer sides and a material that others are seen through."""
     material = materials.path_material(opacity)
-    existing = bpy.data.node_groups.get(GROUP)
+    existing = bpy.data.node_groups.get((GROUP, None))
     if existing is not None:
         return existing
     thin = group.copy()

@@ -6,8 +6,8 @@ import numpy as np
 
 from ....core.errors import RockfallError
 from ....core.reconstruction.triangulation import GRAZING_DEG
-from ....core.terrain.raycast import closest_point
-from ...scene import clicks, pick_names, picks, pictures, places, reconstruction, store, sync, timing, videos
+from ....core.workflow.first_picks import brought_to_terrain, coordinate_sigma
+from ...scene import clicks, pick_names, picks, pictures, places, reconstruction, store, sync, terrain, timing, videos
 from ...scene.places import Place
 
 _VECTORS = (store.POSITION, store.NORMAL, store.SIGMA_POSITION, store.SIGMA_TIME)
@@ -50,7 +50,7 @@ def move(scene: bpy.types.Scene, obj: bpy.types.Object, camera: bpy.types.Object
     _, video_s = pictures.picture_time(scene, camera)
     away = abs(obj[store.TIME] - pictures.common_time(camera, video_s))
     if away <= pictures.SAME_PICTURE * pictures.frame_step_s(camera):
-        obj[store.SIGMA_POSITION] = [place.sigma_m]
+        _keep_sigma(obj, place.sigma_m)
         clicks.keep(scene, obj, camera, place)
         for column, text in (
             ("video", camera.name),
@@ -89,12 +89,11 @@ def use_triangulated(scene: bpy.types.Scene, obj: bpy.types.Object) -> float:
     found = clicks.triangulated(scene, obj)
     if found is None or not np.isfinite(found.point).all():
         raise RockfallError("Click the same event in a second aligned video first, while this pick is selected.")
-    point, seen = found.point[0], obj[store.SEEN].to_dict()
+    point, covariance, seen = found.point[0], found.covariance[0], obj[store.SEEN].to_dict()
     if obj[store.KIND] != "pass" and any(click.centre for click in clicks.of(obj).values()):
-        near = closest_point(places.surface_of(scene), point)
-        point = point if near is None else near.point
+        point, covariance = brought_to_terrain(places.surface_of(scene), point, covariance, terrain.accuracy_m(scene))
     obj[store.POSITION], obj.location = point.tolist(), point
-    obj[store.SIGMA_POSITION] = [float(np.sqrt(np.trace(found.covariance[0]) / 3))]
+    _keep_sigma(obj, coordinate_sigma(covariance))
     obj[store.SEEN] = seen | {"position": point.tolist()}
     if store.NORMAL in obj and reconstruction.ground(scene) is not None:
         del obj[store.NORMAL]  # it was that of the old place
@@ -150,6 +149,14 @@ def restore(obj: bpy.types.Object, kept: dict[str, object]) -> None:
         elif key in obj:
             del obj[key]
     obj.location = kept[store.POSITION]
+
+
+def _keep_sigma(obj: bpy.types.Object, sigma_m: float) -> None:
+    """The standard deviation of a pick's place; none where the camera was not found in its picture."""
+    if np.isfinite(sigma_m):
+        obj[store.SIGMA_POSITION] = [sigma_m]
+    elif store.SIGMA_POSITION in obj:
+        del obj[store.SIGMA_POSITION]
 
 
 def _begin_clock(scene: bpy.types.Scene, name: str) -> None:

@@ -37,7 +37,8 @@ class PickingSettings(bpy.types.PropertyGroup):
         default="CENTRE",
     )  # fmt: skip
     sigma_px: FloatProperty(
-        name="Click ± [px]", description="Standard deviation of a click; the error ellipse comes from it",
+        name="Click ± [px]", description="Standard deviation of a click; the error ellipse comes from it, from the "
+        "camera's and from the terrain's accuracy",
         default=1.0, min=0.05, soft_max=10.0, precision=2,
     )  # fmt: skip
     show_loupe: BoolProperty(name="Loupe", description="Magnify the video under the mouse", default=True)

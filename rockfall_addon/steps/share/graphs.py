@@ -10,6 +10,7 @@ from ....core.output import output_folder
 from ...scene import store
 from ...view.graphs import editor, export
 from ...view.reporting import possible, reported
+from ...view.to_file import asked_file
 
 KINDS = [
     ("IMPACTS", "Impacts", "The graphs of the impacts, as they are set up in their editor"),
@@ -17,6 +18,12 @@ KINDS = [
 ]
 TREES = {"IMPACTS": editor.IMPACTS, "MOTION": editor.MOTION}
 NAMES = {"IMPACTS": "graphs", "MOTION": "motion"}
+
+
+def _follow_format(self: bpy.types.OperatorProperties, context: bpy.types.Context) -> None:
+    """The ending of the file is that of the format. Blender calls this with the bare properties, too."""
+    if Path(self.filepath).name:
+        self.filepath = str(Path(self.filepath).with_suffix(f".{self.file_format}"))
 
 
 class ROCKFALL_OT_export_graphs(bpy.types.Operator):
@@ -36,7 +43,7 @@ class ROCKFALL_OT_export_graphs(bpy.types.Operator):
             ("png", "PNG", "A picture of pixels"),
             ("csv", "CSV", "The numbers of what is shown"),
         ],
-        update=lambda self, context: self.follow_format(),
+        update=_follow_format,
     )  # fmt: skip
     width: IntProperty(name="Width", description="Of the picture [px]", default=1200, min=200, max=8000)
     height: IntProperty(name="Height", description="Of the picture [px]", default=900, min=150, max=8000)
@@ -56,11 +63,6 @@ class ROCKFALL_OT_export_graphs(bpy.types.Operator):
             store.has_role(context.scene, store.PICK_ROLE) or editor.content_of(context) is not None,
             "There is nothing in the graphs: import picks first, or load the demo",
         )
-
-    def follow_format(self) -> None:
-        """The ending of the file is that of the format."""
-        if self.filepath:
-            self.filepath = str(Path(self.filepath).with_suffix(f".{self.file_format}"))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         content = editor.content_of(context)
@@ -87,7 +89,7 @@ class ROCKFALL_OT_export_graphs(bpy.types.Operator):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        path = Path(bpy.path.abspath(self.filepath))
+        path = asked_file(self.filepath)
         if path.suffix.lower().removeprefix(".") not in export.FORMATS:
             path = path.with_name(f"{path.name}.{self.file_format}")
         with output_folder(path.parent) as folder:

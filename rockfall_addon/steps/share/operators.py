@@ -2,7 +2,6 @@
 """Export what was reconstructed."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import bpy
 from bpy.props import StringProperty
@@ -17,6 +16,7 @@ from ...scene import design_sheet, project, reconstruction, simulation, simulati
 from ...view import job
 from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported
+from ...view.to_file import asked_folder
 
 FACTORS = [(name, title, "") for name, title in design_sheet.factor_tables()]
 
@@ -54,7 +54,7 @@ class ROCKFALL_OT_export_tables(_IntoFolder, bpy.types.Operator):
         measured = spins.measure_all(scene)
         result, left_out = reconstruction.reconstruct_good(scene)
         samples = sample_trajectories(result, trails.SAMPLE_STEP_S, surface=terrain.surface_of_scene(scene))
-        with output_folder(Path(bpy.path.abspath(self.directory))) as folder:
+        with output_folder(asked_folder(self.directory)) as folder:
             write_picks(result.picks, folder / "picks.csv")
             write_impacts(result.impacts, folder / "impacts.csv")
             write_trajectories(samples, folder / "trajectories.csv")
@@ -82,7 +82,7 @@ class ROCKFALL_OT_export_simulation(InBackground, _IntoFolder, bpy.types.Operato
         return _IntoFolder.invoke(self, context, event)
 
     def prepare(self, context: bpy.types.Context) -> Work:
-        plan, folder = simulation_setup.plan(context.scene), Path(bpy.path.abspath(self.directory))
+        plan, folder = simulation_setup.plan(context.scene), asked_folder(self.directory)
         counts = simulation_setup.shown_counts(context.scene)
 
         def compute(progress: Progress) -> object:
@@ -121,7 +121,7 @@ class ROCKFALL_OT_design_sheet(InBackground, _IntoFolder, bpy.types.Operator):
 
     def prepare(self, context: bpy.types.Context) -> Work:
         asked = design_sheet.ask(context.scene, self.factors, self.holdout)
-        folder = Path(bpy.path.abspath(self.directory))
+        folder = asked_folder(self.directory)
 
         def compute(progress: Progress) -> object:
             return design_sheet.write(asked, folder, progress)
@@ -148,7 +148,7 @@ class ROCKFALL_OT_export_project(_IntoFolder, bpy.types.Operator):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        written, left_out = project.save_project(context.scene, Path(bpy.path.abspath(self.directory)))
+        written, left_out = project.save_project(context.scene, asked_folder(self.directory))
         _report(self, f"{written.name} is in {self.directory}.", left_out)
         return {"FINISHED"}
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Maps are computed in the background, taken away, and written for a GIS."""
 
-from pathlib import Path
-
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
@@ -16,6 +14,7 @@ from ...scene import georeference, hazard_maps, simulation_setup, store
 from ...view import job
 from ...view.job import InBackground, Work
 from ...view.reporting import possible
+from ...view.to_file import asked_folder
 
 
 class ROCKFALL_OT_compute_maps(InBackground, bpy.types.Operator):
@@ -80,7 +79,7 @@ class ROCKFALL_OT_export_maps(InBackground, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def prepare(self, context: bpy.types.Context) -> Work:
-        scene, folder = context.scene, Path(bpy.path.abspath(self.directory))
+        scene, folder = context.scene, asked_folder(self.directory)
         obj = hazard_maps.maps_of(scene)
         maps, model, held = hazard_maps.read(obj), str(obj[store.MODEL]), hazard_maps.with_barriers(obj)
         faces = hazard_maps.faces_of(scene)

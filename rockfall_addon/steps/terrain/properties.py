@@ -23,8 +23,9 @@ class TerrainSettings(bpy.types.PropertyGroup):
     """Relief and detail of all tiles of a scene."""
 
     accuracy_m: FloatProperty(
-        name="Accuracy", description="Standard deviation of the terrain's height, for the refinement: about 2 cm for a "
-        "terrestrial scan, 5 cm from a drone, 20 cm for an airborne one. 0: half the point spacing, from 2 to 20 cm",
+        name="Accuracy", description="Standard deviation of the terrain's height, for clicks and the refinement: "
+        "about 2 cm for a terrestrial scan, 5 cm from a drone, 20 cm for an airborne one. 0: half the point spacing, "
+        "from 2 to 20 cm",
         default=0.0, min=0.0, soft_max=1.0, precision=3, unit="LENGTH",
     )  # fmt: skip
     hillshade: FloatProperty(

@@ -63,7 +63,8 @@ class ROCKFALL_OT_add_video(FirstImport, bpy.types.Operator):
 
     @reported
     def execute(self, context: bpy.types.Context) -> set[str]:
-        paths = [Path(self.directory) / each.name for each in self.files if each.name] or [Path(self.filepath)]
+        folder = Path(bpy.path.abspath(self.directory))
+        paths = [folder / each.name for each in self.files if each.name] or [Path(bpy.path.abspath(self.filepath))]
         remember_folder(context, paths[0].parent)
         first = start_up.is_untouched(context.scene)
         added, errors = [], []

@@ -70,7 +70,8 @@ def go_to(context: bpy.types.Context, row: int) -> None:
 
 
 def _find(context: bpy.types.Context, compared: comparison.SceneComparison) -> Chosen:
-    ids = {obj.get(store.ID) for obj in context.view_layer.objects.selected if obj.get(store.ROLE) == store.PICK_ROLE}
+    chosen = context.view_layer.objects.selected
+    ids = {obj.get(store.ID) for obj in chosen if obj.get(store.ROLE) == store.PICK_ROLE and store.is_own(obj)}
     found = {(0, row) for row, identifier in enumerate(compared.pick) if identifier in ids} if ids else set()
     sources = {str(one.path): i + 1 for i, one in enumerate(compared.others)}
     found |= {(sources[path], row) for path, row in graph_settings.chosen_elsewhere(context.scene) if path in sources}

@@ -14,7 +14,7 @@ def open_saved(file: Path, name: str = "") -> bpy.types.Scene:
 
     Raises
     ------
-    InputError : Blender cannot open it, it has no such scene, or it is left alone: a newer Rockfall has saved it, or it is linked.
+    InputError : Blender cannot open it, it has no such scene, or a newer Rockfall has saved it.
     """
     try:
         bpy.ops.wm.open_mainfile(filepath=str(file.absolute()))

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..remarks import Remark
 from ..terrain.cloud import Cloud, heights_above_points
+from ..terrain.misplaced import unit_hint
 from ..terrain.raycast import cast_rays
 from ..terrain.surface import Surface
 from ..vectors import Array, Mask
@@ -55,8 +56,8 @@ def check_areas(terrain: Surface | Cloud, polygons: Sequence[Polygon], what: str
     """
     remarks = []
     for polygon in polygons:
-        outside = beside(terrain, places_within(polygon))
-        remarks += _said(outside, named(what, polygon.name, polygon.number), "area", then)
+        places = places_within(polygon)
+        remarks += _said(terrain, places, named(what, polygon.name, polygon.number), "area", then)
     return tuple(remarks)
 
 
@@ -81,8 +82,8 @@ def check_lines(
     """
     remarks = []
     for number, (line, name) in enumerate(zip(lines, names, strict=True), start=1):
-        outside = beside(terrain, places_along(line[:, :2]))
-        remarks += _said(outside, named(what, name, number if len(lines) > 1 else 0), "length", then, refuse)
+        places = places_along(line[:, :2])
+        remarks += _said(terrain, places, named(what, name, number if len(lines) > 1 else 0), "length", then, refuse)
     return tuple(remarks)
 
 
@@ -127,9 +128,10 @@ def parts_on(terrain: Surface | Cloud, line: Array) -> list[Array]:
     return found
 
 
-def _said(outside: Mask, what: str, of: str, then: str, refuse: bool = True) -> list[Remark]:
+def _said(terrain: Surface | Cloud, places: Array, what: str, of: str, then: str, refuse: bool = True) -> list[Remark]:
+    outside = beside(terrain, places)
     if refuse and outside.all():
-        raise InputError(f"The {what} is wholly outside of the terrain", advice=ADVICE)
+        raise InputError(f"The {what} is wholly outside of the terrain", advice=unit_hint(places, terrain) or ADVICE)
     share = float(outside.mean())
     if share == 0.0:
         return []

@@ -59,10 +59,13 @@ def refuse_impossible(source: Source, low: Array, high: Array, unit_m: float | N
         )
     lowest = min(abs(low[2]), abs(high[2])) if low[2] * high[2] > 0 else 0.0
     if lowest > NO_PLACE_M and high[2] - low[2] <= HIGHEST_RELIEF_M:
+        where, _, order = exchanged_axes(low, high).rstrip(".").partition(": ")
+        check = "Check the order of x, y and z, whether the first column is a number, and the unit"
         raise InputError(
-            f"Heights from {low[2]:,.0f} to {high[2]:,.0f} m are nowhere on the Earth",
+            f"Heights from {low[2]:,.0f} to {high[2]:,.0f} m are nowhere on the Earth"
+            + (f": {where}" if order else ""),
             file=path,
-            advice="Check the order of x, y and z, whether the first column is a number, and the unit",
+            advice=f"{order[:1].upper()}{order[1:]}" if order else check,
         )
     extent = high - low
     within_globe = np.abs([low[:2], high[:2]]).max(axis=0) <= [180.0, 90.0]

@@ -137,12 +137,22 @@ def test_names_of_points_in_the_first_column_are_said_to_be_names(tmp_path):
 @pytest.mark.parametrize(
     ("order", "words"),
     [
-        ((0, 2, 1), "exchange y and z in the file"),
-        ((2, 0, 1), "bring them into the order x, y, z"),
-        ((1, 0, 2), "looks like a northing"),
-        ((0, 1, 2), ""),
+        ((0, 2, 1), "Exchange y and z in the file"),
+        ((2, 0, 1), "Bring them into the order x, y, z"),
     ],
 )
+@pytest.mark.parametrize("place", [(352_000.0, 5_130_000.0, 1_200.0), (2_600_000.0, 1_200_000.0, 1_500.0)])
+def test_heights_that_are_another_axis_are_refused_with_the_order(tmp_path, order, words, place):
+    rng = np.random.default_rng(2)
+    points = (np.array(place) + rng.uniform(0, 300, (400, 3)) * [1, 1, 0.5])[:, order]
+    np.savetxt(tmp_path / "a.xyz", points, fmt="%.3f")
+    for read in (read_terrain, inspect_terrain):
+        with pytest.raises(InputError, match="nowhere on the Earth") as caught:
+            read(tmp_path / "a.xyz")
+        assert caught.value.advice == words
+
+
+@pytest.mark.parametrize(("order", "words"), [((1, 0, 2), "looks like a northing"), ((0, 1, 2), "")])
 @pytest.mark.parametrize("place", [(352_000.0, 5_130_000.0, 1_200.0), (2_600_000.0, 1_200_000.0, 1_500.0)])
 def test_exchanged_axes_are_said_by_their_numbers(tmp_path, order, words, place):
     rng = np.random.default_rng(2)

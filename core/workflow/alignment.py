@@ -23,6 +23,8 @@ POOR, REDUNDANT = 2.0, 8
 """Residuals of so many times what was stated, with so many observations to spare: other lenses are tried."""
 BOTH = ("fx", "fy", "c")
 STILL_POOR = 1.5
+ASPECTS = (0.4, 2.5)
+"""Between which pixels are as wide as high, in any video: anamorphic ones twice."""
 EXPLAINS = 0.6
 """One that leaves less than this part of the residuals explains them."""
 ALIKE = 1.1
@@ -222,6 +224,8 @@ def _better(
             other = _resected(pairs, rows, options, (*kept, *more), options.start)
         except RockfallError:
             continue
+        if not ASPECTS[0] < other.camera.fy / other.camera.fx < ASPECTS[1]:
+            continue  # no pixels are so: something else is wrong, such as the unit of the heights
         if other.scatter < EXPLAINS * scatter and other.used.sum() >= found.used.sum():
             tried.append((other.scatter, more, other))
     return tried

@@ -61,7 +61,7 @@ def count(value: object) -> str:
     """A whole number from 0 on."""
     if not isinstance(value, int) or isinstance(value, bool):
         return "is no whole number"
-    return "" if 0 <= value < 2**31 else BEYOND
+    return "" if 0 <= value < 2**30 else BEYOND  # Blender keeps 32 bits, and some are counted up
 
 
 def one_of(known: Collection[str]) -> Check:

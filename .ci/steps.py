@@ -102,14 +102,14 @@ STEPS = (  # in the order in which they begin where they can: the longest way fi
     Step("lint and types", 300, run("lint"), (SET_UP,)),
     Step(ZIPS, 900, run("extension --with-cp314"), (SET_UP,), in_blender=True),
     Step(INSTALLED, 300, INSTALL, (BLENDER, ZIPS), in_blender=True),
-    Step("tests in a real Blender", 900, TESTS_IN_BLENDER, (INSTALLED,), in_blender=True),
-    Step("tests of the core", 1200, run("test core"), (SET_UP,)),
+    Step("tests in a real Blender", 1500, TESTS_IN_BLENDER, (INSTALLED,), in_blender=True),
+    Step("tests of the core", 2700, run("test core"), (SET_UP,)),
     *(
         Step(f"in a window, part {i} of {WINDOWS}", 1200, run(f"interface --part {i}/{WINDOWS}"), (INSTALLED,), True)
         for i in range(1, WINDOWS + 1)
     ),
-    Step("tests in Blender as a module", 1200, run("test blender"), (SET_UP,)),
-    Step("as on another machine", 900, '"$PYTHON" .ci/elsewhere.py .venv/bin/python', (SET_UP,)),
+    Step("tests in Blender as a module", 1800, run("test blender"), (SET_UP,)),
+    Step("as on another machine", 1500, '"$PYTHON" .ci/elsewhere.py .venv/bin/python', (SET_UP,)),
     Step("tests of the pages", 600, run("test browser"), (BROWSER,)),
     Step("from the demo's video to its impacts", 600, run("footage"), (SET_UP,)),
     Step("demo", 600, DEMO, (SET_UP,)),

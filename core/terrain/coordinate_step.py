@@ -170,7 +170,7 @@ def _lies_exactly(points: Array, step: float) -> bool:
     from scipy.spatial import cKDTree
 
     away = ((points[:, :2] - points[len(points) // 2, :2]) ** 2).sum(axis=1)
-    near = points[np.argpartition(away, min(NEAR, len(points)) - 1)[:NEAR]]
+    near = points[np.argsort(away, kind="stable")[:NEAR]]
     some = near[:: max(1, len(near) // NEIGHBOURHOODS)]
     about = near[cKDTree(near).query(some, k=min(NEIGHBOURS + 1, len(near)))[1]]
     centred = about - about.mean(axis=1, keepdims=True)

@@ -221,7 +221,8 @@ def _better(
             continue
         kept = tuple(name for name in options.free if not (name == "f" and "fx" in more))
         try:
-            other = _resected(pairs, rows, options, (*kept, *more), options.start)
+            with np.errstate(all="ignore"):  # of pairs that no lens explains some numbers are none
+                other = _resected(pairs, rows, options, (*kept, *more), options.start)
         except RockfallError:
             continue
         if not ASPECTS[0] < other.camera.fy / other.camera.fx < ASPECTS[1]:

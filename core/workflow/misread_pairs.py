@@ -113,7 +113,8 @@ def check_reading(
         if ((pixel < 0) | (pixel > size)).any():
             continue
         try:
-            other = solve(replace(pairs, pixel=pixel, point=point))
+            with np.errstate(all="ignore"):  # of a reading that no camera explains some numbers are none
+                other = solve(replace(pairs, pixel=pixel, point=point))
         except RockfallError:
             continue
         if other.rmse_px < most and float(other.used.mean()) > FEWEST_USED:

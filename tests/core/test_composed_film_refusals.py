@@ -169,7 +169,7 @@ def test_a_folder_of_somebody_elses_pictures_is_left_alone(site: Path, capsys: p
     (out / "turntable" / "holiday.jpg").write_bytes(b"sea")
     words = ["--preset", "small", "--film", "turntable", "--images", "--frames", "0-1", "--out", str(out)]
     assert main(["render", str(site / "project.toml"), *words]) == 1
-    assert "The folder for the frames holds other files (holiday.jpg). Choose another folder" in capsys.readouterr().err
+    assert "The folder for the frames holds other files (holiday.jpg). Move them" in capsys.readouterr().err
     assert [file.name for file in (out / "turntable").iterdir()] == ["holiday.jpg"]
     assert (out / "turntable" / "holiday.jpg").read_bytes() == b"sea"
 

@@ -13,6 +13,8 @@ from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import Releases, make_releases
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow import hazard
+from rockfall.core.workflow.maps import FACES, HELD_FACES, HELD_MAPS, MAPS, tallies_for
+from rockfall.core.workflow.maps import SCREENS as SCREEN_TALLY
 
 SETTINGS = Settings("noel_2017", seed=3)
 SCREENS = (
@@ -61,13 +63,20 @@ def test_chunks_give_what_all_runs_at_once_give(
 
 
 def test_behind_barriers_what_they_hold_is_missing(ground: Ground, releases: Releases) -> None:
-    before, after = ScreenTally(SCREENS[:1]), ScreenTally(SCREENS[:1])
-    hazard.run_chunks(ground, releases, SETTINGS, [before], behind=[after], barriers=SCREENS[1:])
-    together = ScreenTally(SCREENS)
-    hazard.run_chunks(ground, releases, SETTINGS, [together])
-    road, net = together.figures(with_barriers=True)
+    """Blocks that a barrier holds come to rest in its cells, as many as the screens say, and reach none below."""
+    tallies = tallies_for(ground, 1.0, True, SCREENS)
+    hazard.run_chunks(ground, releases, SETTINGS, list(tallies.values()))
+    free, held, together = tallies[MAPS].maps(), tallies[HELD_MAPS].maps(), tallies[SCREEN_TALLY]
+    net = together.figures(with_barriers=True)[1]
     assert 0 < net.outcomes["held"] < net.hits
-    assert after.figures()[0].hits == road.hits < before.figures()[0].hits
+    rest = [np.nansum(maps.layers["Nr_deposited"]) for maps in (free, held)]
+    left = together.blocks - rest[0]  # over the edge of the terrain
+    assert rest[0] <= rest[1] <= rest[0] + left
+    blocks = [np.nan_to_num(maps.layers["Nr_blocks"]) for maps in (free, held)]
+    assert (blocks[1] <= blocks[0]).all()
+    assert blocks[1].sum() < blocks[0].sum()
+    contacts = [np.nansum(tallies[name].layers()["Nr_contacts"]) for name in (FACES, HELD_FACES)]
+    assert contacts[1] < contacts[0]
 
 
 def test_it_ends_when_enough_are_known(ground: Ground, releases: Releases, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -100,7 +109,7 @@ def test_a_cancel_keeps_what_has_begun(ground: Ground, releases: Releases, monke
     same(tally, first)
 
 
-def test_a_barrier_beside_the_terrain_is_refused(ground: Ground, releases: Releases) -> None:
+def test_a_barrier_beside_the_terrain_is_refused(ground: Ground) -> None:
     far = Screen("far", np.array([[900.0, 0.0], [900.0, 10.0]]), 3.0, 1e5)
     with pytest.raises(InputError, match="beside the terrain"):
-        hazard.run_chunks(ground, releases, SETTINGS, [], barriers=[far])
+        tallies_for(ground, 1.0, False, [far])

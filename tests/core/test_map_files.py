@@ -33,8 +33,8 @@ def values() -> np.ndarray:
     return made
 
 
-def written(path: Path, values: np.ndarray, shift: GlobalShift = SHIFT) -> Path:
-    write_map(path, CELLS, values, LAYERS["E_95CI"], shift, {"BLOCKS": "1000"})
+def written(path: Path, values: np.ndarray, shift: GlobalShift = SHIFT, layer: str = "E_95CI") -> Path:
+    write_map(path, CELLS, values, LAYERS[layer], shift, {"BLOCKS": "1000"})
     return path
 
 
@@ -45,7 +45,7 @@ def items_of(path: Path) -> dict[str, str]:
 
 
 def test_our_own_reader_finds_values_places_and_system(tmp_path, values):
-    source = read_geotiff(written(tmp_path / "E_95CI.tif", values))
+    source = read_geotiff(written(tmp_path / "a.tif", values, layer="Ph_95CI"))  # metres: kJ are no heights
     assert source.crs == "EPSG:2056"
     assert source.grid_shape == CELLS.shape
     points = source.points.reshape(*CELLS.shape, 3)[::-1]
@@ -89,7 +89,7 @@ def test_other_programs_read_the_map_its_unit_and_its_meaning(tmp_path, values):
 
 @pytest.mark.parametrize(("crs", "said"), [("", "unknown"), ("CH1903+ / LV95", "CH1903+ / LV95")])
 def test_a_system_without_a_code_is_named_and_not_invented(tmp_path, values, crs, said):
-    path = written(tmp_path / "a.tif", values, GlobalShift(1000.0, 0.0, 0.0, crs))
+    path = written(tmp_path / "a.tif", values, GlobalShift(1000.0, 0.0, 0.0, crs), "Ph_95CI")
     assert items_of(path)["CRS"] == said
     assert read_geotiff(path).crs == ""
     rasterio = pytest.importorskip("rasterio", reason="rasterio, an independent reader of GeoTIFF, is not installed")
@@ -100,7 +100,7 @@ def test_a_system_without_a_code_is_named_and_not_invented(tmp_path, values, crs
 def test_the_vertical_system_of_a_terrain_comes_back_in_its_maps(tmp_path, values):
     """A terrain with heights in LN02: known after it was opened, and in what is written of it."""
     shift = GlobalShift(2_600_000.0, 1_200_000.0, 0.0, "EPSG:2056", "EPSG:5728")
-    path = written(tmp_path / "heights.tif", np.full(CELLS.shape, 500.0), shift)
+    path = written(tmp_path / "heights.tif", np.full(CELLS.shape, 500.0), shift, "Ph_95CI")
     opened = read_terrain(path).shift
     assert (opened.crs, opened.vertical) == ("EPSG:2056", "EPSG:5728")
     assert items_of(written(tmp_path / "b.tif", values, opened))["VERTICAL_DATUM"] == "EPSG:5728"

@@ -145,7 +145,8 @@ def test_options_go_before_the_project(folder: Path, capsys) -> None:
         ('[simulation.releases]\nfrom = "steep"\nsteeper_than_deg = 60', "No terrain is steeper than 60"),
         ('[simulation.releases]\nfrom = "points"\npoints_m = [[0, 0]]', "There is no terrain"),
         (
-            '[simulation.releases]\nfrom = "line"\npoints_m = [[0, 0], [9, 9]]\ndiameter_m = 4e3',
+            '[simulation.releases]\nfrom = "line"\npoints_m = [[2600050, 1200050], [2600090, 1200060]]\n'
+            "diameter_m = 4e3",
             "is larger than the terrain",
         ),
     ],

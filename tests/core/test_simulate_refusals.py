@@ -96,8 +96,8 @@ SCREENED = ["--screen", "@net.csv"]
         (["--trees", "@low.csv"], "@low.csv, row 2: The height of this tree is -20. Give a number above zero"),
         (["--trees", "@palm.csv"], "@palm.csv, row 2: There is no kind of tree 'palm'. Known are coniferous"),
         (["--trees", "@far_tree.csv"], "@far_tree.csv: No tree stands on the terrain. Give their coordinates"),
-        (["--stems-per-hectare", "300"], "The trees have no diameter at breast height (dbh). Give both, or a table"),
-        (["--dbh-cm", "30"], "The trees have no stems per hectare. Give both, or a table"),
+        (["--stems-per-hectare", "300"], "a forest that is drawn, which needs --dbh-cm, too. Give both"),
+        (["--dbh-cm", "30"], "a forest that is drawn, which needs --stems-per-hectare, too. Give both"),
     ],
 )  # fmt: skip
 def test_options_beside_a_table_of_releases(

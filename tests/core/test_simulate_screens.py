@@ -165,7 +165,7 @@ def test_polygons_of_a_map_are_areas(tmp_path: Path) -> None:
         path = tmp_path / "house.geojson"
         path.write_text(json.dumps({"type": "FeatureCollection", "features": [geometry]}), encoding="utf-8")
         if len(places) == 2:
-            with pytest.raises(InputError, match="polygon house has a hole"):
+            with pytest.raises(InputError, match="area of screen 'house' has holes"):
                 read_screens(path, GlobalShift())
             continue
         screens += read_screens(path, GlobalShift())

@@ -228,7 +228,7 @@ def result_rows(results: Sequence[Mapping[str, object]], name: str) -> list[tupl
                 rows.append((text, _with_interval(one[key], unit)))
         if one.get("verdict") in VERDICTS:
             more = str(one.get("more", ""))
-            rows.append(("For the 95 % values", VERDICTS[one["verdict"]].format(more=more)))
+            rows.append(("Verdict (95 %)", VERDICTS[one["verdict"]].format(more=more)))
         found.append((MODELS[one["model"]].title, rows))
     return found
 

@@ -163,7 +163,7 @@ def test_a_barrier_is_green_only_while_it_is_known_to_be_enough(
     def shown() -> tuple[str, tuple[float, ...]]:
         results = part("rockfall_addon.scene.simulation_setup").screen_results(slope)
         ((_, rows),) = screens.result_rows(results, "road")
-        return dict(rows)["For the 95 % values"], fences._colour(screen, results)
+        return dict(rows)["Verdict (95 %)"], fences._colour(screen, results)
 
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     words, colour = shown()

@@ -636,13 +636,7 @@ def main(seed: int, steps: int, folder: Path) -> int:
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     if not hasattr(bpy.types, "ROCKFALL_PT_installation"):
         enable()
-    walk = Walk(
-        seed,
-        folder,
-        lambda name: importlib.import_module(f"{NAME}.{name}"),
-        first_the_step=bool(seed % 2),
-        can_disable=True,
-    )
+    walk = Walk(seed, folder, lambda name: importlib.import_module(f"{NAME}.{name}"), can_disable=True)
     walk.begin()
     with (folder / "steps.txt").open("w", encoding="utf-8") as told:
         try:

@@ -327,6 +327,8 @@ class Walk:
         scene = self.random.choice(list(bpy.data.scenes))
         name = scene.name
         self.may_go = {key[1] for key in self.before if key[0] == name}
+        shared = [obj for obj in scene.objects if "rockfall_id" in obj and len(obj.users_scene) > 1]
+        self.may_change = bool(shared)  # another scene keeps them now, and does the edits that waited in this one
         bpy.data.scenes.remove(scene)
         return f"delete scene {name}"
 

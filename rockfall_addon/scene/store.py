@@ -269,7 +269,7 @@ def collection(scene: bpy.types.Scene, *path: str) -> bpy.types.Collection:
     """The collection at a path below "Rockfall", created where it is missing."""
     parent = scene.collection
     for name in ("Rockfall", *path):
-        child = next((c for c in parent.children if c.get(COLLECTION_NAME) == name), None)
+        child = next((c for c in parent.children if c.get(COLLECTION_NAME) == name and is_own(c)), None)
         parent = _new_collection(parent, name) if child is None else child
     return parent
 
@@ -277,7 +277,7 @@ def collection(scene: bpy.types.Scene, *path: str) -> bpy.types.Collection:
 def collections(scene: bpy.types.Scene, folder: str, names: Iterable[str]) -> dict[str, bpy.types.Collection]:
     """Many collections of one folder below "Rockfall" by name, created where they are missing."""
     parent = collection(scene, folder)
-    there = {child.get(COLLECTION_NAME): child for child in reversed(parent.children)}
+    there = {child.get(COLLECTION_NAME): child for child in reversed(parent.children) if is_own(child)}
     return {name: there.get(name) or _new_collection(parent, name) for name in names}
 
 
@@ -315,9 +315,10 @@ def remove_collection(scene: bpy.types.Scene, name: str, but: Collection[str] = 
 
     but : names of collections in it that stay, and it with them.
     """
-    ours = next((c for c in scene.collection.children if c.get(COLLECTION_NAME) == "Rockfall"), None)
+    own = filter(is_own, scene.collection.children)
+    ours = next((c for c in own if c.get(COLLECTION_NAME) == "Rockfall"), None)
     for child in list(ours.children) if ours is not None else ():
-        if child.get(COLLECTION_NAME) == name:
+        if child.get(COLLECTION_NAME) == name and is_own(child):
             inner = [each for each in child.children_recursive if each.get(COLLECTION_NAME) not in but]
             for each in (*inner, *(() if but else (child,))):
                 _comings[0] += 1

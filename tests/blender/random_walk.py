@@ -327,6 +327,8 @@ class Walk:
         scene = self.random.choice(list(bpy.data.scenes))
         name = scene.name
         self.may_go = {key[1] for key in self.before if key[0] == name}
+        shared = [obj for obj in scene.objects if "rockfall_id" in obj and len(obj.users_scene) > 1]
+        self.may_change = bool(shared)  # another scene keeps them now, and does the edits that waited in this one
         bpy.data.scenes.remove(scene)
         return f"delete scene {name}"
 
@@ -636,13 +638,7 @@ def main(seed: int, steps: int, folder: Path) -> int:
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     if not hasattr(bpy.types, "ROCKFALL_PT_installation"):
         enable()
-    walk = Walk(
-        seed,
-        folder,
-        lambda name: importlib.import_module(f"{NAME}.{name}"),
-        first_the_step=bool(seed % 2),
-        can_disable=True,
-    )
+    walk = Walk(seed, folder, lambda name: importlib.import_module(f"{NAME}.{name}"), can_disable=True)
     walk.begin()
     with (folder / "steps.txt").open("w", encoding="utf-8") as told:
         try:

@@ -145,3 +145,12 @@ def test_an_empty_scene_takes_the_origin_of_what_comes(part, other: Path) -> Non
     bpy.ops.wm.append(directory=folder_of(other, "Collection"), filename="B")
     assert list(bpy.context.scene["rockfall_shift_m"]) == [2_600_000.0, 1_200_000.0, 1_500.0]
     assert max(abs(value) for obj in of_role("pick") for value in obj.location) < 200
+
+
+def test_new_runs_do_not_go_into_a_linked_collection(part, other: Path, tmp_path: Path) -> None:
+    """A linked folder of our name is not ours: Blender refuses to put anything into it."""
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    bpy.ops.wm.link(directory=folder_of(other, "Collection"), filename="Rockfall", instance_collections=False)
+    assert bpy.ops.rockfall.import_picks(filepath=str(tmp_path / "picks.csv")) == {"FINISHED"}
+    assert len([obj for obj in of_role("pick") if obj.library is None]) == 18
+    assert "went wrong" not in said(part)

@@ -8,6 +8,14 @@ from collections.abc import Iterator
 
 import pytest
 
+try:
+    from hypothesis import HealthCheck, settings
+except ImportError:  # Blender's own Python
+    pass
+else:  # how quickly examples are made says nothing on a machine that does something else, too
+    settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+    settings.load_profile("busy")
+
 LIMIT_S = 480
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: waiting threads cost more than small matrices
 STDERR = pytest.StashKey[int]()

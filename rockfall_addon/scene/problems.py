@@ -39,7 +39,8 @@ def of_result(scene: bpy.types.Scene, result: Reconstruction) -> dict[str, list[
     names = list(dict.fromkeys(result.picks.trajectory.tolist()))
     said: dict[str, list[Remark]] = {name: [] for name in names}
     for remark in (*result.remarks, *impossible_sizes(result)):
-        said[remark.about].append(remark)
+        for name in (remark.about,) if remark.about in said else names[:1]:  # what is of all stands with the first
+            said[name].append(remark)
     impacts = result.impacts
     for i in np.flatnonzero(impacts.normal[:, 2] < BACKSIDE):
         name = str(impacts.trajectory[i])

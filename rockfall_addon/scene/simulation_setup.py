@@ -26,6 +26,7 @@ from ...core.remarks import Remark, from_plain, gravest_first, to_plain
 from ...core.simulation.engine import Simulation
 from ...core.terrain.cloud import Cloud
 from ...core.terrain.surface import Surface
+from ...core.workflow.maps import SCREENS, Mapped
 from ...core.workflow.screens import outside_remarks, screen_remarks, tallies_of
 from ...core.workflow.simulation import ReleaseSource, Scenario, ground_of, remarks_of, run_models
 from . import (
@@ -200,8 +201,9 @@ def export(plan: Plan, counts: Mapping[str, int], folder: Path, progress: Progre
     remarks = gravest_first([*remarks_of(found), *outside_remarks(plan.screens, ground), *screen_remarks(tallies)])
     with output_folder(folder) as place:
         records = default_records(len(releases))
+        mapped = Mapped(tuple(found), {model: {SCREENS: tally} for model, tally in tallies.items()})
         return write_simulations(
-            found, place, record=records, inputs={}, remarks=remarks, screens=tallies, progress=progress
+            found, place, record=records, inputs={}, remarks=remarks, mapped=mapped, progress=progress
         )
 
 

@@ -377,7 +377,7 @@ def test_an_old_film_stays_where_the_new_one_is_not_whole(scene, small_film, par
     small_film.file = str(path)
     error = part("core.errors").RockfallError
 
-    def half(command: list[str], name: str, _: object) -> None:
+    def half(command: list[str], name: str, *_: object) -> None:
         raise error(f"Blender has not made {name} as it should be: 1 of its 3 frames can be read.")
 
     def stopped(*_: object) -> None:

@@ -233,7 +233,7 @@ def test_what_is_missing_is_said_before(drawn: bpy.types.Scene, part, change, wo
     ("change", "words"),
     [
         (lambda s: setattr(s, "steeper_than_deg", 85.0) or setattr(s, "source", "STEEP"), "No terrain is steeper"),
-        (lambda s: setattr(s.drawn, "location", (5000.0, 0.0, 0.0)), "from the terrain"),
+        (lambda s: setattr(s.drawn, "location", (5000.0, 0.0, 0.0)), "outside of the terrain"),
         (lambda s: setattr(s, "diameter_m", 500.0), "larger than the terrain"),
         (lambda s: setattr(s, "number", 40_000), "too many to be shown"),
     ],

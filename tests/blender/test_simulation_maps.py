@@ -121,8 +121,8 @@ def test_maps_are_exported(mapped: bpy.types.Scene, tmp_path: Path, part) -> Non
     assert bpy.ops.rockfall.export_maps(directory=str(tmp_path / "maps")) == {"FINISHED"}
     written = {file.name for file in (tmp_path / "maps").iterdir()}
     assert {"E_95CI.tif", "E_95CI.qml", "Reach_probability.tif", "Nr_deposited.tif"} <= written
-    source = part("core.terrain.geotiff").read_geotiff(tmp_path / "maps" / "E_max.tif")
-    np.testing.assert_allclose(np.nanmax(source.points[:, 2]), np.nanmax(kept(part, mapped).layers["E_max"]))
+    source = part("core.terrain.geotiff").read_geotiff(tmp_path / "maps" / "Ph_max.tif")  # metres: kJ are no heights
+    np.testing.assert_allclose(np.nanmax(source.points[:, 2]), np.nanmax(kept(part, mapped).layers["Ph_max"]))
     assert json.loads(mapped.objects["Maps"]["rockfall_map_of"])["remarks"]
 
 

@@ -175,7 +175,7 @@ FIELD_CASES = Path(__file__).parents[1] / "data" / "field_cases"
 )
 def test_the_dialog_and_what_was_read_say_what_the_file_says_of_its_numbers(part, file: str, words: str) -> None:
     operators = part("rockfall_addon.steps.terrain.operators")
-    dialog = SimpleNamespace(filepath=str(FIELD_CASES / file), unit_m=1.0)
+    dialog = SimpleNamespace(filepath=str(FIELD_CASES / file), unit_m=1.0, _units=dict)
     found = operators.ROCKFALL_OT_import_terrain._inspected(dialog)
     assert any(words in sentence for sentence in found.summary)
     assert bpy.ops.rockfall.import_terrain(filepath=str(FIELD_CASES / file)) == {"FINISHED"}

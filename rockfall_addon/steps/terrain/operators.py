@@ -5,6 +5,7 @@ import textwrap
 from dataclasses import replace
 
 import bpy
+import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ....core.errors import InputError, RockfallError
@@ -37,6 +38,8 @@ from .removing import tiles_of, what_stays
 ACCURACY_M = {"TERRESTRIAL": 0.02, "DRONE": 0.05, "AIRBORNE": 0.2}
 """Standard deviation of a terrain's height by its source."""
 TEXT_TABLES = (".txt", ".csv")  # are picks more often than clouds, so dropping them is left to the picks
+SMALLEST_M = 1.0
+"""Of a terrain: a file that is smaller in millimetres is not in millimetres."""
 LARGE_BYTES = 5_000_000
 """Larger files, and the ground filter, are read beside Blender."""
 
@@ -141,10 +144,12 @@ class ROCKFALL_OT_import_terrain(FirstImport, bpy.types.Operator):
         """What the file holds; where that cannot be metres, millimetres are proposed, and can be changed."""
         try:
             return inspect_terrain(self.filepath, **self._units())
-        except InputError:
+        except InputError as error:
             if self.unit_m not in (0.0, 1.0):
                 raise
             found = inspect_terrain(self.filepath, unit_m=MILLIMETRE_M)
+            if np.max(found.maximum - found.minimum) < SMALLEST_M:
+                raise error from None  # not millimetres: something else is wrong
         self.unit_m = MILLIMETRE_M
         said = "In metres it would be beyond every survey: millimetres are proposed."
         return replace(found, summary=(said, *found.summary))

@@ -20,7 +20,8 @@ STEPS = (
         ("rockfall.time_origin_here", "Begin the Timeline Here", {"what": "SCENE"}),
         ("rockfall.time_origin_here", "Time 0 of All Videos Here", {"what": "CLOCK"}),
         "rockfall.mark_event", "rockfall.reference_video", "rockfall.synchronise_videos", None,
-        "rockfall.use_video_rate", "rockfall.use_named_capture_rate", "rockfall.use_video_size", "rockfall.build_proxy", "rockfall.relink_video",
+        "rockfall.use_video_rate", "rockfall.use_named_capture_rate",
+        "rockfall.use_video_size", "rockfall.build_proxy", "rockfall.relink_video",
     )),
     ("alignment", "3  Alignment", (
         "rockfall.align_views", ("wm.tool_set_by_id", "Tool: Align Camera", {"name": "rockfall.align_tool"}),

@@ -34,7 +34,7 @@ COMMANDS = {
     "terrain": ["terrain", DEMO / "terrain.ply"],
     "align": ["align", FOOTAGE / "pairs.csv", "--video", FOOTAGE / "footage.mp4"],
     "align --moving": [
-        "align", FOOTAGE / "pairs.csv", "--video", FOOTAGE / "footage.mp4", "--moving", "full",
+        "align", FOOTAGE / "pairs.csv", "--video", FOOTAGE / "footage.mp4", "--moving", "rotation",
     ],
     "track": ["track", FOOTAGE / "footage.mp4", "--clicks", FOOTAGE / "clicks.csv"],
     "refine": ["refine", FOOTAGE / "project.toml"],
@@ -48,7 +48,7 @@ COMMANDS = {
     "back-analyse": ["back-analyse", DEMO / "project.toml", "--model", "noel_2017", "--fit", "rn_limit"],
     "design": ["design", DEMO / "project.toml", "--number", "20", "--screen", DEMO / "barriers.csv"],
     "batch": ["batch", DEMO, "simulate", "--number", "20"],
-    "render": ["render", FOOTAGE / "project.toml", "--still"],
+    "render": ["render", DEMO / "project.toml", "--still"],
     "web": ["web", DEMO / "project.toml"],
 }  # fmt: skip
 

@@ -27,7 +27,7 @@ OPACITY = 0.9
 
 
 HATCH = 8.0
-"""Pixels at interface scale 1 from line to line of the hatching of faces that few blocks touch."""
+"""Pixels at interface scale 1 from line to line of the hatching, which is the same from near and far."""
 VERTEX = """
 void main() {
   shown = color;
@@ -35,17 +35,22 @@ void main() {
   gl_Position = ModelViewProjectionMatrix * vec4(pos, 1.0);
 }
 """
-FRAGMENT = """
+LINEAR = """
 vec3 linear(vec3 c) {
   return mix(c / 12.92, pow((max(c, vec3(0.0)) + 0.055) / 1.055, vec3(2.4)), step(vec3(0.04045), c));
 }
-
+"""
+"""GLSL: an sRGB colour as the frame buffer takes it when it is linear."""
+FRAGMENT = (
+    LINEAR
+    + """
 void main() {
   vec3 seen = shown.rgb;
   if (hatched > 0.5 && mod(gl_FragCoord.x + gl_FragCoord.y, hatch) < 0.25 * hatch) { seen = vec3(0.05); }
   fragColor = vec4(srgbTarget ? linear(seen) : seen, shown.a);
 }
 """
+)
 
 
 class _Painted(NamedTuple):

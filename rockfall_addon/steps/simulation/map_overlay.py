@@ -21,8 +21,6 @@ from . import face_overlay
 NEARER = 2e-5
 """The map is drawn so much nearer, in depth, that the terrain that it lies on does not speckle it."""
 OPACITY = 0.85
-HATCH = 8.0
-"""Pixels at interface scale 1 from line to line of the hatching, which is the same from near and far."""
 WEAK = 0.5
 """Opacity of hatched cells in the texture: it tells them apart, and is not drawn."""
 LEGEND_WIDTH = 250
@@ -35,11 +33,9 @@ void main() {
   gl_Position = ModelViewProjectionMatrix * vec4(pos, 1.0);
 }
 """
-FRAGMENT = """
-vec3 linear(vec3 c) {
-  return mix(c / 12.92, pow((max(c, vec3(0.0)) + 0.055) / 1.055, vec3(2.4)), step(vec3(0.04045), c));
-}
-
+FRAGMENT = (
+    face_overlay.LINEAR
+    + """
 void main() {
   ivec2 cell = ivec2(floor((place - grid.xy) / grid.z));
   ivec2 size = textureSize(map, 0);
@@ -52,6 +48,7 @@ void main() {
   fragColor = vec4(srgbTarget ? linear(seen) : seen, opacity);
 }
 """
+)
 
 _handles: list[object] = []
 _batches: dict[int, tuple[tuple, gpu.types.GPUBatch]] = {}  # by the mesh: what it was made of
@@ -148,7 +145,7 @@ def _draw_cells(scene: bpy.types.Scene, painted: _Painted) -> None:
         shader.bind()
         shader.uniform_float("grid", painted.grid)
         shader.uniform_float("opacity", OPACITY)
-        shader.uniform_float("hatch", HATCH * bpy.context.preferences.system.ui_scale)
+        shader.uniform_float("hatch", face_overlay.HATCH * bpy.context.preferences.system.ui_scale)
         shader.uniform_sampler("map", painted.texture)
         batch.draw(shader)
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..extras import FIGURES, is_there
 from ..georeference import GlobalShift
 from ..hazard.classes import classes_of
-from ..hazard.evidence import FEW, Evidence, cell_evidence, row_runs
+from ..hazard.evidence import FEW, Evidence, cell_evidence, outlines, row_runs
 from ..hazard.maps import LAYERS, Maps
 from ..progress import Progress, silent
 from ..terrain.cloud import Cloud
@@ -65,17 +65,15 @@ def write_maps(
 
 def _outlines(maps: Maps, evidence: Evidence) -> FeatureLayer:
     """The cells that say little, as rectangles along rows."""
-    cells, parts, reasons = maps.cells, [], []
+    parts, reasons = [], []
     for reason, mask in ((f"fewer than {FEW} blocks", evidence.few), ("beyond the terrain", evidence.beyond)):
         parts.append(row_runs(mask))
         reasons += [reason] * len(parts[-1])
-    row, first, end = np.concatenate(parts).T.astype(np.float64)
-    corners = np.stack([[first, row], [end, row], [end, row + 1], [first, row + 1], [first, row]], axis=0)  # (5, 2, k)
-    plan = np.array([cells.x0_m, cells.y0_m]) + cells.size_m * corners.transpose(2, 0, 1).reshape(-1, 2)
+    plan = outlines(maps.cells, np.concatenate(parts)).reshape(-1, 2)
     points = np.column_stack([plan, np.zeros(len(plan))])
     return FeatureLayer(
         "evidence", "Cells whose values say little: few blocks enter them, or the terrain ends before", points,
-        np.arange(len(row) + 1) * 5, {"reason": np.array(reasons)}, hatch_style(), closed=True,
+        np.arange(len(reasons) + 1) * 5, {"reason": np.array(reasons)}, hatch_style(), closed=True,
     )  # fmt: skip
 
 

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from ..terrain.cloud import Cloud, heights_above_points
 from ..terrain.raycast import heights_above
 from ..terrain.surface import Surface
+from ..vectors import Array
+from .cells import Cells
 from .face_tally import FaceMaps
 from .maps import Maps
 
@@ -93,3 +95,11 @@ def row_runs(mask: NDArray[np.bool_]) -> NDArray[np.intp]:
     row, first = np.nonzero(change == 1)
     end = np.nonzero(change == -1)[1]
     return np.column_stack([row, first, end])
+
+
+def outlines(cells: Cells, runs: NDArray[np.intp]) -> Array:
+    """(k, 5, 2) closed rectangles around stretches of cells along rows (see `row_runs`), local [m]."""
+    row, first, end = runs.T.astype(np.float64)
+    corners = np.stack([[first, row], [end, row], [end, row + 1], [first, row + 1], [first, row]], axis=0)
+    places: Array = np.array([cells.x0_m, cells.y0_m]) + cells.size_m * corners.transpose(2, 0, 1)
+    return places

@@ -14,7 +14,7 @@ from ..analysis.figures import FORMATS, INK, MUTED, PAGE_IN, STYLE, save_named
 from ..colours import rounded_top
 from ..extras import FIGURES, demand
 from ..hazard.classes import classes_of
-from ..hazard.evidence import cell_evidence, entered, row_runs
+from ..hazard.evidence import cell_evidence, entered, outlines, row_runs
 from ..hazard.maps import LAYERS, Maps
 from ..progress import Progress, silent
 from ..terrain.cloud import Cloud, heights_above_points
@@ -164,7 +164,7 @@ def map_figure(
         masks = [(mask, hatch) for mask, hatch in ((evidence.few, HATCH), (evidence.beyond, BEYOND)) if mask.any()]
         weak = []
         for (mask, hatch), words in zip(masks, evidence.in_words, strict=True):
-            axes.add_patch(_hatching(mask, maps, np.array([west, south]), hatch))
+            axes.add_patch(_hatching(mask, maps, np.array([shift.x, shift.y]), hatch))
             weak.append(Patch(facecolor="white", edgecolor=INK, linewidth=0.3, hatch=hatch, label=_broken(words)))
         drawn: list[Any] = []
         if releases is not None:
@@ -203,16 +203,14 @@ def map_figure(
         return figure
 
 
-def _hatching(mask: NDArray[np.bool_], maps: Maps, corner: Array, hatch: str) -> "PathPatch":
-    """Over some cells. corner : south-west, as the axes have it."""
+def _hatching(mask: NDArray[np.bool_], maps: Maps, moved: Array, hatch: str) -> "PathPatch":
+    """Over some cells. moved : from local to the axes' coordinates (2,)."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path as Outline
 
-    row, first, end = row_runs(mask).T.astype(np.float64)
-    corners = np.stack([[first, row], [end, row], [end, row + 1], [first, row + 1], [first, row]], axis=0)
-    places = corner + maps.cells.size_m * corners.transpose(2, 0, 1).reshape(-1, 2)
-    codes = np.tile([Outline.MOVETO, *[Outline.LINETO] * 3, Outline.CLOSEPOLY], len(row))
-    outline = Outline(places.reshape(-1, 2), codes if len(codes) else None)
+    around = outlines(maps.cells, row_runs(mask)) + moved
+    codes = np.tile([Outline.MOVETO, *[Outline.LINETO] * 3, Outline.CLOSEPOLY], len(around))
+    outline = Outline(around.reshape(-1, 2), codes if len(codes) else None)
     return PathPatch(outline, facecolor="none", edgecolor=INK, linewidth=0.0, hatch=hatch, zorder=2.5)
 
 

@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What lies about each triangle, for a block that rolls or slides on it: compiled kernels.
 
-It is kept in a tuple `facets` of three, in the order of the leaves: the triangle across each edge (m, 3), from corner
+It is kept in a tuple `facets` of five, in the order of the leaves: the triangle across each edge (m, 3), from corner
 e to e + 1, −1 where a block is not taken over it; the bend there (m, 3), tan(θ/2) of the angle θ by which the ground
-rises beyond, negative where it falls; and what a sphere is clear of (m, 4), which is looked up when a block is first on
-the triangle. That is
+rises beyond, negative where it falls; what a sphere is clear of (m, 4), which is looked up when a block is first on
+the triangle; and how the bend θ is divided: the curvature (m, 3) [1/m] of the surface of which the triangles are
+samples, and the crease (m, 3) [rad] that this surface has at the edge.
+
+A smooth surface bends between its samples as well: from the corner opposite the edge on one side to the one on the
+other, the normals at the corners (means over the triangles around) turn by 2 θ. At a crease between two planes they
+turn by θ, all at the edge. What they turn beyond θ, no less than 0 and no more than θ, belongs to the curved surface;
+the rest of θ is the crease.
+
+What a sphere is clear of is
 
 - the radius of the largest sphere that, wherever it touches the triangle, meets no triangle without a common corner;
   negative where it is exact, else it is at least that; 0 where it was not looked up;
@@ -16,7 +24,7 @@ each number is known or 0, a thread that finds a 0 looks up all four, and a tria
 limits no sphere that is as small as the one that asked.
 """
 
-from math import inf, sqrt
+from math import atan, atan2, inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -67,18 +75,32 @@ def upward(corners, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def link(corners, face, neighbours, place, across, bend):  # type: ignore[no-untyped-def]
-    """Fill `across` and `bend`.
+def bend_angle(bend):  # type: ignore[no-untyped-def]
+    """θ [rad] of tan(θ/2)."""
+    return 2.0 * atan(bend)
+
+
+@kernel
+def _tilt(normals, v, out, n):  # type: ignore[no-untyped-def]
+    """By how much the normal at a vertex leans from n towards `out` [rad]."""
+    m = (normals[v, 0], normals[v, 1], normals[v, 2])
+    return atan2(dot(m, out), dot(m, n))
+
+
+@kernel
+def link(corners, face, neighbours, place, faces, normals, across, bend, curvature, crease):  # type: ignore[no-untyped-def]
+    """Fill `across`, `bend`, `curvature` and `crease`.
 
     Parameters
     ----------
     face : (m,) behind each triangle in the order of the leaves; place : (m,) of each face in that order.
     neighbours : (m, 3) of the faces, negative where there is none, or more than one.
+    faces, normals : (m, 3) vertices of each face; (n, 3) upward normals of the vertices, of any length.
     """
     for i in range(len(corners)):
         n = upward(corners, i)
         for e in range(3):
-            across[i, e], bend[i, e] = -1, 0.0
+            across[i, e], bend[i, e], curvature[i, e], crease[i, e] = -1, 0.0, 0.0, 0.0
             other = neighbours[face[i], e]
             if other < 0:
                 continue
@@ -98,8 +120,33 @@ def link(corners, face, neighbours, place, across, bend):  # type: ignore[no-unt
             rise, run = dot(way, n), dot(way, out)
             whole = sqrt(rise * rise + run * run)
             bend[i, e] = rise / (whole + run) if whole + run > 1e-6 * whole else 1e6
+            turn = bend_angle(bend[i, e])
+            before = _tilt(normals, faces[face[i], (e + 2) % 3], out, n)
+            beyond = _tilt(normals, faces[other, apex], out, n)
+            curved = max(min(before - beyond - turn, max(turn, 0.0)), min(turn, 0.0))
+            crease[i, e] = turn - curved
+            width = 0.5 * (whole - dot(minus(corner(corners, i, (e + 2) % 3), start), out))
+            curvature[i, e] = curved / width
             if n[2] > LEVEL and (n[2] * run - out[2] * rise) > LEVEL * whole:
                 across[i, e] = j
+
+
+@kernel
+def convexity(facets, corners, i, v, n):  # type: ignore[no-untyped-def]
+    """How much the surface about triangle i bends down along v: its curvature [1/m] times |v|².
+
+    The curvatures at the three edges, each across its edge, add up to that of the surface: exactly for a quadratic one
+    that is sampled on a grid.
+    """
+    total = 0.0
+    for e in range(3):
+        k = facets[3][i, e]
+        if k != 0.0:
+            along = minus(corner(corners, i, (e + 1) % 3), corner(corners, i, e))
+            out = cross(along, n)
+            crossing = dot(v, out)
+            total -= k * crossing * crossing / dot(along, along)
+    return max(total, 0.0)
 
 
 @kernel
@@ -172,7 +219,7 @@ def _apart(corners, i, j):  # type: ignore[no-untyped-def]
 def _look_about(tree, stack, facets, i, radius):  # type: ignore[no-untyped-def]
     """Look up what a sphere on triangle i is clear of; returns the first of the four numbers."""
     bounds, first, count, corners = tree[:4]
-    across, _, clear = facets
+    across, _, clear = facets[:3]
     asked = np.float32(BEYOND * radius)
     reach = 2.0 * (1.0 + 1e-5) * asked
     n = upward(corners, i)

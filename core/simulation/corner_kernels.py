@@ -58,14 +58,25 @@ def met(v, n, m, inertia, part):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _have_a_corner_in_common(corners, i, j):  # type: ignore[no-untyped-def]
+    for k in range(3):
+        for e in range(3):
+            if corner(corners, i, k) == corner(corners, j, e):
+                return True
+    return False
+
+
+@kernel
 def share_of_crease(facets, corners, i, j, v, n):  # type: ignore[no-untyped-def]
     """Which part of a turn of the normal from triangle i to j is a crease of the surface, 0 to 1.
 
-    It is that of the edge between both; where there is none, of the edges of triangle i that v crosses, and 1 where
-    none of them bends.
+    It is that of the edge between both; where they have a corner in common alone, of the edges of triangle i that v
+    crosses; and 1 where they have none: the contact has jumped over what is between.
     """
     across, bend, _, _, crease = facets
     bends = creases = 0.0
+    if not _have_a_corner_in_common(corners, i, j):
+        return 1.0
     for e in range(3):
         if bend[i, e] == 0.0:
             continue

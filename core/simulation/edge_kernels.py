@@ -135,7 +135,7 @@ def keeps(facets, corners, i, j, v, n, m, radius, gravity, hop):  # type: ignore
     n, m : normals of both. hop : [m].
     """
     square, pull = dot(v, v), gravity * max(m[2], 0.0)
-    bends = 0.5 * (convexity(facets, corners, i, v, n) + convexity(facets, corners, j, v, m))
+    bends = 0.5 * (convexity(facets, i, v) + convexity(facets, j, v))
     if bends * (square - pull * radius) > pull * square:
         return False
     crossing = dot(v, m) * share_of_crease(facets, corners, i, j, v, n)

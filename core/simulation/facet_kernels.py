@@ -33,6 +33,8 @@ from ..compiled import borrowing as kernel
 
 GENTLE = 0.2679
 """tan(θ/2) of the bends that a block is taken over at once, 30°: beyond, an edge is a corner or a crest."""
+SLIGHT, DISTINCT = 0.0873, 0.2618
+"""A crest up to 5° is taken for one that is rounded between the samples, one from 15° on for a sharp one [rad]."""
 LEVEL = 0.05
 """Vertical part of a normal below which a triangle is a wall."""
 NONE = 1e-30
@@ -123,30 +125,56 @@ def link(corners, face, neighbours, place, faces, normals, across, bend, curvatu
             turn = bend_angle(bend[i, e])
             before = _tilt(normals, faces[face[i], (e + 2) % 3], out, n)
             beyond = _tilt(normals, faces[other, apex], out, n)
-            curved = max(min(before - beyond - turn, max(turn, 0.0)), min(turn, 0.0))
-            crease[i, e] = turn - curved
-            width = 0.5 * (whole - dot(minus(corner(corners, i, (e + 2) % 3), start), out))
-            curvature[i, e] = curved / width
+            square = turn * turn - 4.0 * (before * before + (turn + beyond) * (turn + beyond))
+            sharp = sqrt(max(square, 0.0))
+            if turn < 0.0:
+                x = min(max((sharp - SLIGHT) / (DISTINCT - SLIGHT), 0.0), 1.0)
+                sharp *= -x * x * (3.0 - 2.0 * x)
+            crease[i, e] = sharp
+            width = min(whole, -dot(minus(corner(corners, i, (e + 2) % 3), start), out))
+            curvature[i, e] = (turn - sharp) / width
             if n[2] > LEVEL and (n[2] * run - out[2] * rise) > LEVEL * whole:
                 across[i, e] = j
 
 
 @kernel
-def convexity(facets, corners, i, v, n):  # type: ignore[no-untyped-def]
-    """How much the surface about triangle i bends down along v: its curvature [1/m] times |v|².
+def curve(corners, across, edge_curvature, curvature):  # type: ignore[no-untyped-def]
+    """Fill `curvature` from that at the edges.
 
-    The curvatures at the three edges, each across its edge, add up to that of the surface: exactly for a quadratic one
-    that is sampled on a grid.
+    The curvatures at a triangle's three edges, each across its edge, add up to that of the surface: exactly for a
+    quadratic one that is sampled on a grid. The mean with those of the triangles around is taken.
     """
-    total = 0.0
-    for e in range(3):
-        k = facets[3][i, e]
-        if k != 0.0:
-            along = minus(corner(corners, i, (e + 1) % 3), corner(corners, i, e))
-            out = cross(along, n)
-            crossing = dot(v, out)
-            total -= k * crossing * crossing / dot(along, along)
-    return max(total, 0.0)
+    for i in range(len(corners)):
+        n = upward(corners, i)
+        xx = xy = yy = 0.0
+        for e in range(3):
+            k = edge_curvature[i, e]
+            if k != 0.0:
+                along = minus(corner(corners, i, (e + 1) % 3), corner(corners, i, e))
+                out, size = cross(along, n), dot(along, along)
+                x, y = out[0] - out[2] * n[0] / n[2], out[1] - out[2] * n[1] / n[2]
+                xx, xy, yy = xx + k * x * x / size, xy + k * x * y / size, yy + k * y * y / size
+        curvature[i, 0], curvature[i, 1], curvature[i, 2] = xx, xy, yy
+    for i in range(len(corners)):
+        for k in range(3):
+            edge_curvature[i, k] = curvature[i, k]
+    for i in range(len(corners)):
+        count = 1
+        for e in range(3):
+            j = across[i, e]
+            if j >= 0:
+                count += 1
+                for k in range(3):
+                    curvature[i, k] += edge_curvature[j, k]
+        for k in range(3):
+            curvature[i, k] /= count
+
+
+@kernel
+def convexity(facets, i, v):  # type: ignore[no-untyped-def]
+    """How much the surface about triangle i bends down along v: its curvature [1/m] times |v|²."""
+    h = facets[3]
+    return max(-(h[i, 0] * v[0] * v[0] + 2.0 * h[i, 1] * v[0] * v[1] + h[i, 2] * v[1] * v[1]), 0.0)
 
 
 @kernel

@@ -158,7 +158,7 @@ class Ground:
         bend, curvature, crease = (np.empty((m, 3), np.float32) for _ in range(3))
         if m:
             from ..terrain.kernels import edge_neighbours
-            from .facet_kernels import link
+            from .facet_kernels import curve, link
 
             face = self.index.face
             place = np.empty(m, np.int32)
@@ -166,8 +166,9 @@ class Ground:
             neighbours = edge_neighbours(self.faces, len(self.vertices))
             link(
                 self.index.corners, face, neighbours, place, self.faces, self._vertex_normals,
-                across, bend, curvature, crease,
+                across, bend, at_edges := np.empty((m, 3), np.float32), crease,
             )  # fmt: skip
+            curve(self.index.corners, across, at_edges, curvature)
         return across, bend, clear, curvature, crease
 
     @property

@@ -49,7 +49,7 @@ HOP = 0.1
 """A rebound that rises less than this part of the radius above the ground is none."""
 STEP, FALL = 0.5, 0.05
 """A step on the ground is shorter than these parts of the radius: along the ground, and in free fall."""
-LEAST_STEP = 0.01
+LEAST_STEP = 0.0025
 """Steps that turn the normal by more than `FREE` are shortened down to this part of the radius: what turns it then is
 a corner, where the block touches two planes at once."""
 HELD, MOST_HELD = 1e-4, 100
@@ -455,7 +455,7 @@ def run_block(  # type: ignore[no-untyped-def]
             if held > MOST_HELD or lingers > MOST_HELD:
                 end = STOPPED
                 break
-            stride = min(2.0 * stride, STEP)
+            stride = min(4.0 * stride, STEP)
             turned, square, blocked = _along((v[0], v[1], v[2] + pull), e), speed * speed, False
             if meets:
                 share = 1.0

@@ -35,6 +35,8 @@ GENTLE = 0.2679
 """tan(θ/2) of the bends that a block is taken over at once, 30°: beyond, an edge is a corner or a crest."""
 SLIGHT, DISTINCT = 0.0873, 0.2618
 """A crest up to 5° is taken for one that is rounded between the samples, one from 15° on for a sharp one [rad]."""
+OWN = 3.0
+"""Weight of a triangle's own curvature beside that of each of the three around."""
 LEVEL = 0.05
 """Vertical part of a normal below which a triangle is a wall."""
 NONE = 1e-30
@@ -159,15 +161,17 @@ def curve(corners, across, edge_curvature, curvature):  # type: ignore[no-untype
         for k in range(3):
             edge_curvature[i, k] = curvature[i, k]
     for i in range(len(corners)):
-        count = 1
+        weight = OWN
+        for k in range(3):
+            curvature[i, k] *= OWN
         for e in range(3):
             j = across[i, e]
             if j >= 0:
-                count += 1
+                weight += 1.0
                 for k in range(3):
                     curvature[i, k] += edge_curvature[j, k]
         for k in range(3):
-            curvature[i, k] /= count
+            curvature[i, k] /= weight
 
 
 @kernel

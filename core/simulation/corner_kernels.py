@@ -22,6 +22,8 @@ FREE = 0.0524
 shorter steps."""
 WALL, UPRIGHT = 0.7854, 1.5708
 """From 45° on the second plane is met more and more as the impact model has it, from 90° on entirely [rad]."""
+STRAIGHT = 1e-7
+"""Sine of the angle between two planes that are one."""
 FUZZY = 0.0873
 """By so much the normals turn that are fitted to points [rad], 5°, for their noise."""
 
@@ -40,20 +42,18 @@ def met(v, n, m, inertia, part):  # type: ignore[no-untyped-def]
     v, n : along the plane before, and its normal. inertia : c of c m r² for a block that rolls, 0 for one that slides.
     part : of the loss that is due, as a power.
     """
-    cosine = dot(n, m)
-    sine = sqrt(max(1.0 - cosine * cosine, 0.0))
-    if sine < 1e-9:
-        return v
     t = cross(n, m)
+    sine = sqrt(dot(t, t))
+    if sine < STRAIGHT:
+        return v
     t = (t[0] / sine, t[1] / sine, t[2] / sine)
-    edgewise = dot(v, t)
-    towards = (dot(v, m) - cosine * dot(v, n)) / sine
-    kept = max((cosine + inertia) / (1.0 + inertia), 0.0) ** part
-    s = towards * kept / sine
+    ahead = cross(t, m)
+    kept = max((dot(n, m) + inertia) / (1.0 + inertia), 0.0) ** part
+    edgewise, crossing = dot(v, t), kept * dot(v, cross(t, n))
     return (
-        edgewise * t[0] + s * (cosine * m[0] - n[0]),
-        edgewise * t[1] + s * (cosine * m[1] - n[1]),
-        edgewise * t[2] + s * (cosine * m[2] - n[2]),
+        edgewise * t[0] + crossing * ahead[0],
+        edgewise * t[1] + crossing * ahead[1],
+        edgewise * t[2] + crossing * ahead[2],
     )
 
 

@@ -4,7 +4,7 @@
 Each table sets the engine beside what does not depend on a mesh: a closed form, or the same surface sampled otherwise.
 
 kinks       a plane of 45°, then a gentler one, with one sharp concave edge between. A rolling sphere that meets a
-            second plane plastically keeps the speed (cos T + c)/(1 + c), with its inertia c m r²; a sliding one keeps cos T.
+            second plane plastically keeps the speed (cos T + c)/(1 + c), with the inertia c m r²; a sliding one cos T.
 fillets     a slope of 40° onto the flat, rounded with the radius R by n edges. From R = r on a sphere touches the arc
             at one place at a time: its stop is that of the energy line. Below, it hits as in the sharp kink.
 crests      the convex likewise: a block takes off where v² > g cosβ (R + r).

@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 
 type Corner = Literal["plastic", "keep", "sliding"]
 HOP = 0.1
-"""A rebound that rises less than this part of the radius is none: this is a rule of the simulation, not of its method."""
+"""A rebound that rises less than this part of the radius is none: a rule of the simulation, not of its method."""
 ROLLS = {"azzoni_1995": 0.4, "coulomb": 0.0}
 
 
@@ -176,7 +176,7 @@ def fall(
             elif v @ n <= 0.0:
                 v = v - (v @ n) * n + 1e-9 * n
             continue
-        # On the ground: gravity along it less friction moves the block; across it gravity moves it until something holds.
+        # On the ground: gravity along it, less friction, moves the block; across it until something holds.
         along = down - (down @ n) * n
         brake = friction * G * max(n[2], 0.0)
         if speed < 1e-3:

@@ -110,7 +110,7 @@ def mesh_changes(
     ------
     InputError : see `refined_ground`.
     """
-    progress("Dividing the triangles")
+    progress("Dividing the triangles", 0, 0)
     finer, edge = refined_ground(scenario, COARSE * float(np.median(releases.diameter_m)))
     count = min(blocks, len(releases))
     runs = np.unique(np.linspace(0, len(releases) - 1, count).astype(np.intp))

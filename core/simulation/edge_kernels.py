@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A block on the ground that comes to an edge between two triangles: compiled kernels.
 
-Where the ground rises beyond, it touches the next triangle already, and goes on along that. Where it falls, it turns
-about the edge when it is slow, v² < g r for the part of v across; else it leaves the ground, and its flight is followed
-over the triangles that it passes to the one that it lands on. Bends of more than 30° and whatever else is near are left
+Where the ground rises beyond, it touches the next triangle already, and goes on along that; a crease takes speed
+(`corner_kernels`). Where it falls, it turns about the edge when it is slow, v² < g r for the part of v across, or when
+the surface that the triangles are samples of holds it; else it leaves the ground, and its flight is followed over the
+triangles that it passes to the one that it lands on. Bends of more than 30° and whatever else is near are left
 to the steps of `motion_kernels`.
 """
 
@@ -13,7 +14,8 @@ import numpy as np
 
 from ..compiled import borrowing as kernel
 from .contact_kernels import first_root
-from .facet_kernels import GENTLE, NOWHERE, corner, dot, is_clear, minus, upward
+from .corner_kernels import met, share_of_crease
+from .facet_kernels import GENTLE, NOWHERE, convexity, corner, dot, is_clear, minus, upward
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE
 
 MOST_PASSED = 8
@@ -43,7 +45,7 @@ def _within(tree, facets, i, p, n, radius, but):  # type: ignore[no-untyped-def]
 
     but : a triangle across an edge that it may touch.
     """
-    corners, (across, bend, _) = tree[3], facets
+    corners, across, bend = tree[3], facets[0], facets[1]
     for edge in range(3):
         start, k = _inward(corners, i, edge, n)
         h = dot(minus(p, start), k)
@@ -71,28 +73,27 @@ def _in_flight(p, v, gravity, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, shortest):  # type: ignore[no-untyped-def]
+def onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, inertia, shortest):  # type: ignore[no-untyped-def]
     """From one triangle at once onto the one that rises beyond an edge and is touched.
 
     Parameters
     ----------
-    shortest : [s] a block that comes back sooner moves along the corner between both.
+    inertia : see `met`. shortest : [s] a block that comes back sooner moves along the corner between both.
 
     Returns
     -------
-    v, n, place : after it; the speed is kept.
+    v, n, place : after it; at a crease with the loss of `met`.
     edge : `ON_TRIANGLE`; or `AT_ANOTHER` where nothing is changed.
     """
     j = np.int64(facets[0][place, edge])
     if j < 0 or facets[1][place, edge] > GENTLE:
         return v, n, place, AT_ANOTHER
     m = upward(tree[3], j)
-    turned = _along(v, m)
-    size, speed = sqrt(dot(turned, turned)), sqrt(dot(v, v))
-    if size == 0.0 or not _within(tree, facets, j, p, m, radius, place):
+    share = share_of_crease(facets, tree[3], place, j, v, n)
+    turned = met(v, n, m, inertia, share * share)
+    speed = sqrt(dot(turned, turned))
+    if speed == 0.0 or not _within(tree, facets, j, p, m, radius, place):
         return v, n, place, AT_ANOTHER
-    scale = speed / size
-    turned = (turned[0] * scale, turned[1] * scale, turned[2] * scale)
     down = factor * gravity * m[2]
     brake = mu * down / speed
     a = (
@@ -123,6 +124,25 @@ def _take_off(tree, facets, stack, p, v, n, m, place, j, t, radius, gravity, wid
 
 
 @kernel
+def keeps(facets, corners, i, j, v, n, m, radius, gravity, hop):  # type: ignore[no-untyped-def]
+    """Whether a block stays on the ground that falls away from triangle i to j, as the surface that they are samples of.
+
+    It does where gravity bends its path as much as the surface is curved, v² ≤ g cosβ (R + r), and where the crease
+    that is left between both sends it no higher than a hop.
+
+    Parameters
+    ----------
+    n, m : normals of both. hop : [m].
+    """
+    square, pull = dot(v, v), gravity * max(m[2], 0.0)
+    bends = 0.5 * (convexity(facets, i, v) + convexity(facets, j, v))
+    if bends * (square - pull * radius) > pull * square:
+        return False
+    crossing = dot(v, m) * share_of_crease(facets, corners, i, j, v, n)
+    return crossing * crossing <= 2.0 * pull * hop
+
+
+@kernel
 def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, hop, shortest):  # type: ignore[no-untyped-def]
     """Over an edge beyond which the ground falls: about it, or in a hop.
 
@@ -138,7 +158,7 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu,
     n, place : of the ground there; −1 where it flies off, with the time from which on it has left the ground; and, with
         a time of 0, where steps have to follow.
     """
-    corners, (across, bend, _) = tree[3], facets
+    corners, across, bend = tree[3], facets[0], facets[1]
     j = np.int64(across[place, edge])
     if j < 0 or bend[place, edge] < -GENTLE or dot(v, v) == 0.0:
         return 0.0, p, v, n, -1
@@ -146,7 +166,9 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu,
     cosine, rises, fall = dot(m, n), dot(v, m), gravity * m[2]
     height = radius * (cosine - 1.0)
     square = rises * rises + 2.0 * fall * height
-    if square <= 0.0 or rises + sqrt(square) <= fall * shortest:
+    if keeps(facets, corners, place, j, v, n, m, radius, gravity, hop) or (
+        square <= 0.0 or rises + sqrt(square) <= fall * shortest
+    ):
         contact = (p[0] - radius * n[0], p[1] - radius * n[1], p[2] - radius * n[2])
         wide = radius + hop
         if not (

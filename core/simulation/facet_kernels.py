@@ -1,10 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What lies about each triangle, for a block that rolls or slides on it: compiled kernels.
 
-It is kept in a tuple `facets` of three, in the order of the leaves: the triangle across each edge (m, 3), from corner
+It is kept in a tuple `facets` of five, in the order of the leaves: the triangle across each edge (m, 3), from corner
 e to e + 1, −1 where a block is not taken over it; the bend there (m, 3), tan(θ/2) of the angle θ by which the ground
-rises beyond, negative where it falls; and what a sphere is clear of (m, 4), which is looked up when a block is first on
-the triangle. That is
+rises beyond, negative where it falls; what a sphere is clear of (m, 4), which is looked up when a block is first on
+the triangle; and how the bend θ is divided: the curvature (m, 3) [1/m] of the surface of which the triangles are
+samples, and the crease (m, 3) [rad] that this surface has at the edge.
+
+A smooth surface bends between its samples as well: from the corner opposite the edge on one side to the one on the
+other, the normals at the corners (means over the triangles around) turn by 2 θ. At a crease between two planes they
+turn by θ, all at the edge. What they turn beyond θ, no less than 0 and no more than θ, belongs to the curved surface;
+the rest of θ is the crease.
+
+What a sphere is clear of is
 
 - the radius of the largest sphere that, wherever it touches the triangle, meets no triangle without a common corner;
   negative where it is exact, else it is at least that; 0 where it was not looked up;
@@ -16,7 +24,7 @@ each number is known or 0, a thread that finds a 0 looks up all four, and a tria
 limits no sphere that is as small as the one that asked.
 """
 
-from math import inf, sqrt
+from math import atan, atan2, inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -25,6 +33,10 @@ from ..compiled import borrowing as kernel
 
 GENTLE = 0.2679
 """tan(θ/2) of the bends that a block is taken over at once, 30°: beyond, an edge is a corner or a crest."""
+SLIGHT, DISTINCT = 0.0873, 0.2618
+"""A crest up to 5° is taken for one that is rounded between the samples, one from 15° on for a sharp one [rad]."""
+OWN = 3.0
+"""Weight of a triangle's own curvature beside that of each of the three around."""
 LEVEL = 0.05
 """Vertical part of a normal below which a triangle is a wall."""
 NONE = 1e-30
@@ -67,18 +79,32 @@ def upward(corners, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def link(corners, face, neighbours, place, across, bend):  # type: ignore[no-untyped-def]
-    """Fill `across` and `bend`.
+def bend_angle(bend):  # type: ignore[no-untyped-def]
+    """θ [rad] of tan(θ/2)."""
+    return 2.0 * atan(bend)
+
+
+@kernel
+def _tilt(normals, v, out, n):  # type: ignore[no-untyped-def]
+    """By how much the normal at a vertex leans from n towards `out` [rad]."""
+    m = (normals[v, 0], normals[v, 1], normals[v, 2])
+    return atan2(dot(m, out), dot(m, n))
+
+
+@kernel
+def link(corners, face, neighbours, place, faces, normals, across, bend, curvature, crease):  # type: ignore[no-untyped-def]
+    """Fill `across`, `bend`, `curvature` and `crease`.
 
     Parameters
     ----------
     face : (m,) behind each triangle in the order of the leaves; place : (m,) of each face in that order.
     neighbours : (m, 3) of the faces, negative where there is none, or more than one.
+    faces, normals : (m, 3) vertices of each face; (n, 3) upward normals of the vertices, of any length.
     """
     for i in range(len(corners)):
         n = upward(corners, i)
         for e in range(3):
-            across[i, e], bend[i, e] = -1, 0.0
+            across[i, e], bend[i, e], curvature[i, e], crease[i, e] = -1, 0.0, 0.0, 0.0
             other = neighbours[face[i], e]
             if other < 0:
                 continue
@@ -98,8 +124,61 @@ def link(corners, face, neighbours, place, across, bend):  # type: ignore[no-unt
             rise, run = dot(way, n), dot(way, out)
             whole = sqrt(rise * rise + run * run)
             bend[i, e] = rise / (whole + run) if whole + run > 1e-6 * whole else 1e6
+            turn = bend_angle(bend[i, e])
+            before = _tilt(normals, faces[face[i], (e + 2) % 3], out, n)
+            beyond = _tilt(normals, faces[other, apex], out, n)
+            square = turn * turn - 4.0 * (before * before + (turn + beyond) * (turn + beyond))
+            sharp = sqrt(max(square, 0.0))
+            if turn < 0.0:
+                x = min(max((sharp - SLIGHT) / (DISTINCT - SLIGHT), 0.0), 1.0)
+                sharp *= -x * x * (3.0 - 2.0 * x)
+            crease[i, e] = sharp
+            width = min(whole, -dot(minus(corner(corners, i, (e + 2) % 3), start), out))
+            curvature[i, e] = (turn - sharp) / width
             if n[2] > LEVEL and (n[2] * run - out[2] * rise) > LEVEL * whole:
                 across[i, e] = j
+
+
+@kernel
+def curve(corners, across, edge_curvature, curvature):  # type: ignore[no-untyped-def]
+    """Fill `curvature` from that at the edges.
+
+    The curvatures at a triangle's three edges, each across its edge, add up to that of the surface: exactly for a
+    quadratic one that is sampled on a grid. The mean with those of the triangles around is taken.
+    """
+    for i in range(len(corners)):
+        n = upward(corners, i)
+        xx = xy = yy = 0.0
+        for e in range(3):
+            k = edge_curvature[i, e]
+            if k != 0.0:
+                along = minus(corner(corners, i, (e + 1) % 3), corner(corners, i, e))
+                out, size = cross(along, n), dot(along, along)
+                x, y = out[0] - out[2] * n[0] / n[2], out[1] - out[2] * n[1] / n[2]
+                xx, xy, yy = xx + k * x * x / size, xy + k * x * y / size, yy + k * y * y / size
+        curvature[i, 0], curvature[i, 1], curvature[i, 2] = xx, xy, yy
+    for i in range(len(corners)):
+        for k in range(3):
+            edge_curvature[i, k] = curvature[i, k]
+    for i in range(len(corners)):
+        weight = OWN
+        for k in range(3):
+            curvature[i, k] *= OWN
+        for e in range(3):
+            j = across[i, e]
+            if j >= 0:
+                weight += 1.0
+                for k in range(3):
+                    curvature[i, k] += edge_curvature[j, k]
+        for k in range(3):
+            curvature[i, k] /= weight
+
+
+@kernel
+def convexity(facets, i, v):  # type: ignore[no-untyped-def]
+    """How much the surface about triangle i bends down along v: its curvature [1/m] times |v|²."""
+    h = facets[3]
+    return max(-(h[i, 0] * v[0] * v[0] + 2.0 * h[i, 1] * v[0] * v[1] + h[i, 2] * v[1] * v[1]), 0.0)
 
 
 @kernel
@@ -172,7 +251,7 @@ def _apart(corners, i, j):  # type: ignore[no-untyped-def]
 def _look_about(tree, stack, facets, i, radius):  # type: ignore[no-untyped-def]
     """Look up what a sphere on triangle i is clear of; returns the first of the four numbers."""
     bounds, first, count, corners = tree[:4]
-    across, _, clear = facets
+    across, _, clear = facets[:3]
     asked = np.float32(BEYOND * radius)
     reach = 2.0 * (1.0 + 1e-5) * asked
     n = upward(corners, i)

@@ -154,16 +154,30 @@ class Ground:
     def facets(self) -> Any:
         """What lies about each triangle, for blocks that roll: see `facet_kernels`; empty with points."""
         m = 0 if len(self.points) else len(self.faces)
-        across, bend, clear = np.empty((m, 3), np.int32), np.empty((m, 3), np.float32), np.zeros((m, 4), np.float32)
+        across, clear = np.empty((m, 3), np.int32), np.zeros((m, 4), np.float32)
+        bend, curvature, crease = (np.empty((m, 3), np.float32) for _ in range(3))
         if m:
             from ..terrain.kernels import edge_neighbours
-            from .facet_kernels import link
+            from .facet_kernels import curve, link
 
             face = self.index.face
             place = np.empty(m, np.int32)
             place[face] = np.arange(m, dtype=np.int32)
-            link(self.index.corners, face, edge_neighbours(self.faces, len(self.vertices)), place, across, bend)
-        return across, bend, clear
+            neighbours = edge_neighbours(self.faces, len(self.vertices))
+            link(
+                self.index.corners, face, neighbours, place, self.faces, self._vertex_normals,
+                across, bend, at_edges := np.empty((m, 3), np.float32), crease,
+            )  # fmt: skip
+            curve(self.index.corners, across, at_edges, curvature)
+        return across, bend, clear, curvature, crease
+
+    @property
+    def _vertex_normals(self) -> Array:
+        """(n, 3) upward, each the sum of the areas around."""
+        areas = face_cross_products(self.vertices, self.faces)
+        areas = np.where(areas[:, 2:] < 0.0, -areas, areas)
+        corner, size = self.faces.ravel(), len(self.vertices)
+        return np.column_stack([np.bincount(corner, np.repeat(areas[:, k], 3), size) for k in range(3)])
 
     @cached_property
     def element(self) -> NDArray[np.int32]:

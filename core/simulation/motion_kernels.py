@@ -28,8 +28,9 @@ from ..compiled import borrowing, kernel
 from ..terrain.kernels import STACK_SIZE
 from .chance_kernels import ATTITUDE, fill_uniform
 from .contact_kernels import TOUCHING_M, inlined, last_root
+from .corner_kernels import FREE, FUZZY, angle_between, met, share_of_crease, share_of_wall
 from .drag_kernels import DRAG_CHANGE, with_drag
-from .edge_kernels import onto, over
+from .edge_kernels import keeps, onto, over
 from .facet_kernels import NOWHERE
 from .ground_kernels import box, first_contact
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE, leg
@@ -48,8 +49,9 @@ HOP = 0.1
 """A rebound that rises less than this part of the radius above the ground is none."""
 STEP, FALL = 0.5, 0.05
 """A step on the ground is shorter than these parts of the radius: along the ground, and in free fall."""
-SHARP = 0.866
-"""Cosine between the normals of two steps below which a concave edge takes the speed towards it."""
+LEAST_STEP = 0.0025
+"""Steps that turn the normal by more than `FREE` are shortened down to this part of the radius: what turns it then is
+a corner, where the block touches two planes at once."""
 HELD, MOST_HELD = 1e-4, 100
 """A block that moves less than this part of its radius in so many steps is held where it is."""
 LINGERS = 0.3
@@ -252,6 +254,7 @@ def run_block(  # type: ignore[no-untyped-def]
     zero = (0.0, 0.0, 0.0)
     bounds = box(tree)
     factor = 1.0 / (1.0 + inertia) if law == AZZONI else 1.0
+    rolls, stride = inertia if law == AZZONI else 0.0, STEP
     shortest = sqrt(2.0 * FALL * radius / gravity)
     time, length, impacts, at_once, held, end = 0.0, 0.0, 0, 0, 0, -1
     v_max = sqrt(_dot(v, v))
@@ -368,7 +371,7 @@ def run_block(  # type: ignore[no-untyped-def]
         mu = friction[own + zone[place]]
         dt = shortest
         if speed > 0.0:
-            dt = min(dt, STEP * radius / speed)
+            dt = min(dt, stride * radius / speed)
         cosine = n[2]
         steep = sqrt(max(1.0 - cosine * cosine, 0.0))
         if speed < 1e-6 and steep <= mu * cosine:
@@ -402,10 +405,17 @@ def run_block(  # type: ignore[no-untyped-def]
                 ahead = _along((v[0], v[1], v[2] + pull), n)
                 away, e, hit, against, other, distance = _touching(tree, stack, free, ahead, radius, nearby, close, n)
             if distance > radius + TOUCHING_M:
-                t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)
-                q, turned = _at(free, falling, (0.0, 0.0, -gravity), t if hit >= 0 else 0.0)
-                t, lands = t + dt, _dot(turned, e)
-                moves = hit >= 0 and e[2] > 0.0 and lands * lands < 2.0 * gravity * e[2] * HOP * radius
+                drop = inf
+                if len(tree) == 6 and not leaves:
+                    down = (-n[0], -n[1], -n[2])
+                    drop, e, hit = first_contact(tree, stack, times, free, down, zero, radius, radius)
+                if drop < inf and keeps(facets, tree[3], place, hit, v, n, e, radius, gravity, HOP * radius):
+                    q, turned, t, moves = _at(free, down, zero, drop)[0], v, dt, True
+                else:
+                    t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)
+                    q, turned = _at(free, falling, (0.0, 0.0, -gravity), t if hit >= 0 else 0.0)
+                    t, lands = t + dt, _dot(turned, e)
+                    moves = hit >= 0 and e[2] > 0.0 and lands * lands < 2.0 * gravity * e[2] * HOP * radius
                 if not moves:
                     grounded, known, at_once = False, drag == 0.0, 0
                     if record >= IMPACTS:
@@ -422,7 +432,7 @@ def run_block(  # type: ignore[no-untyped-def]
                 v = _dragged(v, factor * drag, part * ds)
             n, place, came = e, hit, v
             if len(tree) == 6 and part == 1.0 and 0 <= edge < AT_ANOTHER and facets[1][place, edge] > 0.0:
-                v, n, place, edge = onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, dt)
+                v, n, place, edge = onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, rolls, dt)
             held = held + 1 if ds < HELD * radius else 0
             if held > MOST_HELD:
                 end = STOPPED
@@ -432,6 +442,11 @@ def run_block(  # type: ignore[no-untyped-def]
                 break
             way = (away[0] - p[0], away[1] - p[1], away[2] - p[2])
             ds = sqrt(_dot(way, way))
+            towards, angle = -_dot(v, against), angle_between(n, against)
+            meets = towards > 0.0 and angle > FREE
+            if meets and stride > LEAST_STEP and len(tree) == 6:
+                stride = max(0.25 * stride, LEAST_STEP)
+                continue
             held = held + 1 if ds < HELD * radius else 0
             gone = (away[0] - anchor[0], away[1] - anchor[1], away[2] - anchor[2])
             lingers += 1
@@ -440,30 +455,46 @@ def run_block(  # type: ignore[no-untyped-def]
             if held > MOST_HELD or lingers > MOST_HELD:
                 end = STOPPED
                 break
-            towards = -_dot(v, against)
-            if towards > 0.0 and towards * towards > 2.0 * gravity * HOP * radius and _dot(against, n) < SHARP:
-                fill_uniform(seed, run, impacts, draws)
-                v1, w1 = v, w
-                v, w = rebound(v1, against, w1, radius, mass, parameters[own + zone[other]], draws)
-                impacts += 1
-                if record >= IMPACTS:
-                    write(rows, count, run, IMPACT, time, p, v, w, v1, w1, against, other)
-                    count += 1
-                marked = False
-                rises = _dot(v, against)
-                if against[2] <= 0.0 or rises * rises >= 2.0 * gravity * against[2] * HOP * radius:
-                    grounded = False
+            stride = min(4.0 * stride, STEP)
+            turned, square, blocked = _along((v[0], v[1], v[2] + pull), e), speed * speed, False
+            if meets:
+                share = 1.0
+                if len(tree) == 6:
+                    share = share_of_crease(facets, tree[3], place, other, v, n)
                 else:
-                    v, n, place = _along(v, against), against, other
-                continue
-            turned = _along((v[0], v[1], v[2] + pull), e)
-            square = speed * speed
+                    share = sqrt(max(1.0 - (FUZZY / angle) ** 2, 0.0))
+                after, wall = met(v, n, against, rolls, share * share), share_of_wall(angle)
+                if wall > 0.0 and towards * towards > 2.0 * gravity * HOP * radius:
+                    fill_uniform(seed, run, impacts, draws)
+                    v1, w1 = v, w
+                    v, w = rebound(v1, against, w1, radius, mass, parameters[own + zone[other]], draws)
+                    v = (
+                        after[0] + wall * (v[0] - after[0]),
+                        after[1] + wall * (v[1] - after[1]),
+                        after[2] + wall * (v[2] - after[2]),
+                    )
+                    impacts += 1
+                    if record >= IMPACTS:
+                        write(rows, count, run, IMPACT, time, p, v, w, v1, w1, against, other)
+                        count += 1
+                    marked = False
+                    rises = _dot(v, against)
+                    if against[2] <= 0.0 or rises * rises >= 2.0 * gravity * against[2] * HOP * radius:
+                        grounded = False
+                    else:
+                        v, n, place = _along(v, against), against, other
+                    continue
+                back = -gravity * factor * (n[2] - against[2] * _dot(against, n))
+                if 2.0 * _dot(after, n) > -back * shortest:
+                    turned, square, e, hit = after, _dot(after, after), against, other
+                else:
+                    blocked = True
             back = _dot(turned, against)
-            blocked = back < 0.0 and _dot(against, e) < SHARP
-            if blocked:
-                turned = _in_corner(turned, e, against)
+            if blocked or (back < 0.0 and angle_between(against, e) > FREE):
+                blocked = True
+                turned = _in_corner(turned, e if angle_between(against, e) > FREE else n, against)
             size = sqrt(_dot(turned, turned))
-            if blocked or _dot(e, n) < SHARP:
+            if blocked:
                 square = min(square, size * size)
             loss = 2.0 * factor * gravity * (way[2] + mu * max(cosine, 0.0) * ds)
             left = square - loss

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rolling or sliding block that meets a second plane: compiled kernels.
+
+A sphere that rolls on one plane with the speed v and meets another that rises by the angle T beyond loses what drives
+it into the second plane, and rolls on along that. Its angular momentum about the new contact stays, so that
+
+    v' = v (cos T + c)/(1 + c)
+
+with the inertia c m r², c = 0 for a block that slides. The part of the velocity along the edge between both stays. The
+loss goes with T²: n edges of T/n lose 1/n of it, and a concave arc on which the sphere touches one place takes nothing.
+"""
+
+from math import acos, sqrt
+
+import numpy as np
+
+from ..compiled import borrowing as kernel
+from .facet_kernels import bend_angle, corner, cross, dot, minus
+
+FREE = 0.0524
+"""A turn of the normal within one step up to this [rad], 3°, is a surface that bends; a larger one is looked at in
+shorter steps."""
+WALL, UPRIGHT = 0.7854, 1.5708
+"""From 45° on the second plane is met more and more as the impact model has it, from 90° on entirely [rad]."""
+FUZZY = 0.0873
+"""By so much the normals turn that are fitted to points [rad], 5°, for their noise."""
+
+
+@kernel
+def angle_between(n, m):  # type: ignore[no-untyped-def]
+    return acos(min(max(dot(n, m), -1.0), 1.0))
+
+
+@kernel
+def met(v, n, m, inertia, part):  # type: ignore[no-untyped-def]
+    """The velocity along a plane that a block meets, of the normal m.
+
+    Parameters
+    ----------
+    v, n : along the plane before, and its normal. inertia : c of c m r² for a block that rolls, 0 for one that slides.
+    part : of the loss that is due, as a power.
+    """
+    cosine = dot(n, m)
+    sine = sqrt(max(1.0 - cosine * cosine, 0.0))
+    if sine < 1e-9:
+        return v
+    t = cross(n, m)
+    t = (t[0] / sine, t[1] / sine, t[2] / sine)
+    edgewise = dot(v, t)
+    towards = (dot(v, m) - cosine * dot(v, n)) / sine
+    kept = max((cosine + inertia) / (1.0 + inertia), 0.0) ** part
+    s = towards * kept / sine
+    return (
+        edgewise * t[0] + s * (cosine * m[0] - n[0]),
+        edgewise * t[1] + s * (cosine * m[1] - n[1]),
+        edgewise * t[2] + s * (cosine * m[2] - n[2]),
+    )
+
+
+@kernel
+def _have_a_corner_in_common(corners, i, j):  # type: ignore[no-untyped-def]
+    for k in range(3):
+        for e in range(3):
+            if corner(corners, i, k) == corner(corners, j, e):
+                return True
+    return False
+
+
+@kernel
+def share_of_crease(facets, corners, i, j, v, n):  # type: ignore[no-untyped-def]
+    """Which part of a turn of the normal from triangle i to j is a crease of the surface, 0 to 1.
+
+    It is that of the edge between both; where they have a corner in common alone, of the edges of triangle i that v
+    crosses; and 1 where they have none: the contact has jumped over what is between.
+    """
+    across, bend, _, _, crease = facets
+    bends = creases = 0.0
+    if not _have_a_corner_in_common(corners, i, j):
+        return 1.0
+    for e in range(3):
+        if bend[i, e] == 0.0:
+            continue
+        turn, part = abs(bend_angle(bend[i, e])), abs(crease[i, e])
+        if across[i, e] == j:
+            return part / turn
+        along = minus(corner(corners, i, (e + 1) % 3), corner(corners, i, e))
+        crossing = dot(v, cross(along, n))
+        weight = crossing * crossing / dot(along, along)
+        bends, creases = bends + weight * turn, creases + weight * part
+    return min(creases / bends, 1.0) if bends > 0.0 else 1.0
+
+
+@kernel
+def share_of_wall(turn):  # type: ignore[no-untyped-def]
+    """How much of an impact a second plane is that rises by an angle, 0 to 1."""
+    x = min(max((turn - WALL) / (UPRIGHT - WALL), 0.0), 1.0)
+    return x * x * (3.0 - 2.0 * x)

@@ -126,7 +126,7 @@ def fall(
 
     Parameters
     ----------
-    p, v : of the centre; without spin.
+    p, v : of the centre. Its spin counts from the first impact or take-off on; where it starts on the ground, it rolls.
     corner : what two contacts at once take: "plastic", what a body that rolls loses as it comes to roll on the second;
         "sliding", all that goes into it; "keep", nothing.
     fine : way of one step as a part of the radius.
@@ -141,7 +141,7 @@ def fall(
     p, v, w = np.array(p, float), np.array(v, float), np.zeros(3)
     down = np.array([0.0, 0.0, -G])
     out, on, n, time = Fall(), False, np.array([0.0, 0.0, 1.0]), 0.0
-    still = 0
+    still, spun = 0, False
     while time < most_s:
         speed = np.linalg.norm(v)
         out.v_max_mps = max(out.v_max_mps, speed)
@@ -168,9 +168,10 @@ def fall(
             if v @ n < 0.0 and (v @ n) ** 2 >= 2.0 * G * max(n[2], 0.0) * hop * radius:
                 u = found.draw_type(*(rng.random(found.draws) if rng is not None else np.full(found.draws, np.nan)))
                 out.impacts.append((p.copy(), v.copy()))
+                spun = True
                 v, w = (np.array(x) for x in found.function(tuple(v), tuple(n), tuple(w), radius, mass, numbers, u))
             elif v @ n < 0.0:
-                v = _gripped(v, n, w, radius, c)
+                v = _gripped(v, n, w, radius, c) if spun else v - (v @ n) * n
             if n[2] > 0.0 and (v @ n) ** 2 < 2.0 * G * n[2] * hop * radius:
                 v, on = v - (v @ n) * n, True
             elif v @ n <= 0.0:
@@ -197,7 +198,7 @@ def fall(
         time += dt
         held = _held(around, q)
         if held is None:
-            p, v, on, w = p, v, False, np.cross(n, v) / radius
+            on, w, spun = False, np.cross(n, v) / radius, True
             out.offs.append(p.copy())
             time -= dt
             p = p + 1e-9 * n
@@ -265,9 +266,12 @@ def _turned(
             v = flat * (np.linalg.norm(v) / size) if size > 0.0 else flat
         elif corner == "sliding":
             v = flat
-        else:  # angular momentum about the new contact: what moves and what turns together roll on
-            spin = (n @ m) * v - (v @ m) * n  # (n × v) × m, the velocity that the spin would roll with there
-            v = (flat + c * (spin - (spin @ m) * m)) / (1.0 + c)
+        else:  # angular momentum about the new contact, of what runs across the edge between both; the rest rolls on
+            edge = np.cross(n, m)
+            edge = edge / max(np.linalg.norm(edge), 1e-12)
+            along, across = (v @ edge) * edge, v - (v @ edge) * edge
+            spin = (n @ m) * across - (across @ m) * n  # (n × v) × m, the velocity that the spin would roll with there
+            v = along + (across - (across @ m) * m + c * (spin - (spin @ m) * m)) / (1.0 + c)
         n = m
     else:
         return _projected(v, normals), hit
@@ -361,7 +365,7 @@ def fall_on_function(
     count = len(p)
     p, v, w = np.array(p, float), np.array(v, float), np.zeros((count, 3))
     down = np.array([0.0, 0.0, -G])
-    on, going = np.zeros(count, bool), np.ones(count, bool)
+    on, going, spun = np.zeros(count, bool), np.ones(count, bool), np.zeros(count, bool)
     out = Smooth(p, np.zeros(count), np.zeros(count, int), np.zeros(count, int), np.zeros(count), np.zeros(count, bool))
     xy = p[:, :2].copy()
 
@@ -405,6 +409,7 @@ def fall_on_function(
             on[k[off]] = False
             out.offs[k[off]] += 1
             w[k[off]] = np.cross(n0[off], u[off]) / radius
+            spun[k[off]] = True
         k = np.flatnonzero(going & ~on)
         if k.size:
             step = np.full(k.size, dt)
@@ -430,8 +435,9 @@ def fall_on_function(
                     v2, w2 = found.function(tuple(v[i]), tuple(m), tuple(w[i]), radius, mass, numbers, u)
                     v[i], w[i] = v2, w2
                     out.impacts[i] += 1
+                    spun[i] = True
                 else:
-                    v[i] = _gripped(v[i], m, w[i], radius, c)
+                    v[i] = _gripped(v[i], m, w[i], radius, c) if spun[i] else v[i] - (v[i] @ m) * m
                 if (v[i] @ m) ** 2 < 2 * G * m[2] * hop * radius:
                     v[i], on[i] = v[i] - (v[i] @ m) * m, True
                     p[i] = p[i] + (radius - gap[row]) * m

@@ -4,7 +4,6 @@
 import csv
 import errno
 import json
-import re
 import os
 import re
 import signal

@@ -2,6 +2,7 @@
 """``rockfall simulate``: blocks that fall down the terrain → tables of runs, impacts, motion, hits; maps."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -119,6 +120,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FIRST-LAST",
         help="only these of all blocks, as a part of the same simulation (default all)",
     )
+    parser.add_argument(
+        "--check-mesh",
+        action="store_true",
+        help="also tell how much the run-out depends on the triangles: some of the blocks fall once more, on a mesh "
+        "whose triangles are divided until their edges are half a diameter, at least once",
+    )
     parser.add_argument("--threads", type=whole, metavar="N", help="default: all cores; the result is the same")
     add_worker_options(parser)
     add_terrain_options(parser)
@@ -131,6 +138,8 @@ def run(arguments: argparse.Namespace) -> int:
     simulate = simulate_on_workers if several_workers(arguments) else _simulate_here
     with output_folder(arguments.out) as folder, PrintedProgress() as progress:
         work = work_as_asked(arguments, progress)
+        if arguments.check_mesh:
+            work = _with_checked_mesh(work, progress)
         done = simulate(arguments, work, folder, progress)
     forget_chunks(done.kept)
     for sentence in (*work.scenario.terrain.summary, *done.remarks):
@@ -139,6 +148,15 @@ def run(arguments: argparse.Namespace) -> int:
     if done.asked:
         raise Interrupt(done.asked, f"what was finished is written in {arguments.out}")
     return 0
+
+
+def _with_checked_mesh(work: Work, progress: PrintedProgress) -> Work:
+    """The same, with what a finer mesh changes."""
+    from ..workflow.mesh_check import change_remarks, mesh_changes
+
+    with stopped_by_interrupt(progress) as counted:
+        changes = mesh_changes(work.scenario, work.ground, work.releases, progress=counted)
+    return replace(work, mesh_remarks=tuple(change_remarks(changes)))
 
 
 def _simulate_here(arguments: argparse.Namespace, work: Work, folder: Path, progress: PrintedProgress) -> Done:
@@ -193,6 +211,7 @@ def _remarks(mapped: "Mapped", work: Work) -> "list[Remark]":
 
     said = [
         *remarks_of(mapped.simulations, list(work.scenario.models)),
+        *work.mesh_remarks,
         *map_remarks(mapped.cells),
         *outside_remarks(work.screens, work.ground),
         *screen_remarks(mapped.screens),

@@ -27,6 +27,7 @@ from .tree_options import trees_said
 if TYPE_CHECKING:
     from ..hazard.screens import Screen
     from ..reconstruction.trajectory import Reconstruction
+    from ..remarks import Remark
     from ..simulation.ground import Ground
     from ..simulation.parameter_draws import ParameterDraws
     from ..simulation.release import Releases
@@ -59,6 +60,7 @@ class Work:
     until_known : share of the blocks at a screen whose energy and height are to be known; None lets all blocks fall.
     measured : what the project has measured, where that is to be written beside it.
     inputs : what it is → the file that decides it.
+    mesh_remarks : what a finer mesh changes, where that was asked for.
     """
 
     scenario: "Scenario"
@@ -72,6 +74,7 @@ class Work:
     until_known: float | None
     measured: "Reconstruction | None"
     inputs: Mapping[str, Path]
+    mesh_remarks: "tuple[Remark, ...]" = ()
 
 
 def work_as_asked(arguments: argparse.Namespace, progress: PrintedProgress) -> Work:

@@ -104,6 +104,7 @@ def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path,
         simulations = mapped.simulations
         said = (
             *remarks_of(simulations, list(scenario.models)),
+            *work.mesh_remarks,
             *map_remarks(mapped.cells),
             *outside_remarks(work.screens, work.ground),
             *screen_remarks(mapped.screens),

@@ -40,6 +40,7 @@ from ..simulation.results import fell_through
 from ..simulation.trees import LAW, NOT_KNOWN, Trees
 from ..terrain.cloud import Cloud
 from ..terrain.surface import Surface
+from .mesh_fineness import fineness_remarks
 
 type ReleaseSource = Callable[[Ground], Releases]
 """Puts the blocks on a ground: points, a line, a polygon, steep faces, measured releases, a table."""
@@ -269,6 +270,7 @@ def remarks_of(simulations: Sequence[Simulation], models: Sequence[str] = ()) ->
     remarks += _remarks_of_trees(simulations[0].settings.trees)
     remarks += [*ground.remarks, *code_remarks(ground.shift.crs), *simulations[0].releases.remarks]
     remarks += _remarks_of_points(simulations[0])
+    remarks += fineness_remarks(simulations)
     remarks += [Remark(text, "note", "terrain") for text in _fault_sentences(ground)]
     remarks += [Remark(f"No block meets {name}.", "note", name) for name in _not_met(simulations)]
     return tuple(gravest_first(remarks))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How much the motion on the ground depends on the triangles: kinks, fillets, crests, meshes, scanned tiles, thresholds.
+"""How much the motion on the ground depends on the triangles: kinks, fillets, crests, meshes, tiles, thresholds.
 
 Each table sets the engine beside what does not depend on a mesh: a closed form, or the same surface sampled otherwise.
 
-kinks       a plane of 45°, then a gentler one, with one sharp concave edge between. A rolling sphere that meets a second
-            plane plastically keeps the speed (cos T + c)/(1 + c), with its inertia c m r²; a sliding one keeps cos T.
+kinks       a plane of 45°, then a gentler one, with one sharp concave edge between. A rolling sphere that meets a
+            second plane plastically keeps the speed (cos T + c)/(1 + c), with the inertia c m r²; a sliding one cos T.
 fillets     a slope of 40° onto the flat, rounded with the radius R by n edges. From R = r on a sphere touches the arc
             at one place at a time: its stop is that of the energy line. Below, it hits as in the sharp kink.
 crests      the convex likewise: a block takes off where v² > g cosβ (R + r).
@@ -93,7 +93,7 @@ def contacts(run: object) -> tuple[int, int]:
 
 def kinks(options: argparse.Namespace) -> None:
     first, before, along = np.radians(45.0), 20.0, 2.0
-    print("sharp concave kink below 45°; block of %.2f m" % options.diameter)
+    print(f"sharp concave kink below 45°; block of {options.diameter:.2f} m")
     print(f"{'law':<12}{'model':<10}{'mu':>5}{'kink':>6}{'v before':>10}{'v behind':>10}{'kept v²':>9}{'plastic':>9}"
           f"{'off by':>8}{'stop m':>9}{'impacts':>9}{'offs':>6}")  # fmt: skip
     r = options.diameter / 2
@@ -151,13 +151,17 @@ def first_speed2(records: object, r: float, first: float, pull: float, mu: float
 def fillets(options: argparse.Namespace) -> None:
     r, first, last, along, before = options.diameter / 2, np.radians(40.0), 0.0, 1.0, 8.0
     model, parameters = NEUTRAL
-    print("40° onto the flat, rounded with R by n edges; block of %.2f m; run-out beyond the kink, as a part of the "
-          "energy line's\n(below R = r: of a block that hits both planes plastically)" % options.diameter)  # fmt: skip
+    print(f"40° onto the flat, rounded with R by n edges; block of {options.diameter:.2f} m; run-out beyond the kink,")
+    print("as a part of the energy line's (below R = r: of a block that hits both planes plastically)")
     for law in options.laws:
         c = INERTIA[law]
         pull = 2 * G / (1 + c)
         for mu in options.friction:
-            print(f"\n{law}, mu {mu:g}\n{'R/r':>6}" + "".join(f"{n:>8}" for n in options.edges) + "   edges; sharp kink: 0")
+            print(
+                f"\n{law}, mu {mu:g}\n{'R/r':>6}"
+                + "".join(f"{n:>8}" for n in options.edges)
+                + "   edges; sharp kink: 0"
+            )
             for ratio in options.ratios:
                 cells = []
                 for edges in options.edges:
@@ -181,19 +185,28 @@ def fillets(options: argparse.Namespace) -> None:
 def crests(options: argparse.Namespace) -> None:
     r, first, last, along, before = options.diameter / 2, np.radians(5.0), np.radians(35.0), 0.5, 4.0
     model, parameters = NEUTRAL
-    print("5° onto 35°, rounded with R by n edges; block of %.2f m; s² = v²/(g cosβ (R + r)) at the begin of the arc" % options.diameter)
-    print("each cell: take-offs, and the angle β of the first [°]; last: by how much v behind differs from the energy line's")
+    print(
+        f"5° onto 35°, rounded with R by n edges; block of {options.diameter:.2f} m; "
+        "s² = v²/(g cosβ (R + r)) at the begin of the arc"
+    )
+    print("each cell: take-offs, the angle β of the first [°], and how far v behind is from the energy line's")
     for law in options.laws:
         c = INERTIA[law]
         pull = 2 * G / (1 + c)
         for mu in options.friction:
-            print(f"\n{law}, mu {mu:g}\n{'R/r':>6}{'s':>6}{'due at':>8}" + "".join(f"{n:>17}" for n in options.edges) + "   edges")
+            print(
+                f"\n{law}, mu {mu:g}\n{'R/r':>6}{'s':>6}{'due at':>8}"
+                + "".join(f"{n:>17}" for n in options.edges)
+                + "   edges"
+            )
             for ratio in options.ratios:
                 for s in options.speeds:
                     way = (ratio + 1) * r
                     square = s**2 * G * np.cos(first) * way
                     angle = np.linspace(first, last, 2001)
-                    on_arc = square + pull * way * (np.cos(first) - np.cos(angle) - mu * (np.sin(angle) - np.sin(first)))
+                    on_arc = square + pull * way * (
+                        np.cos(first) - np.cos(angle) - mu * (np.sin(angle) - np.sin(first))
+                    )
                     off = np.flatnonzero(on_arc > G * np.cos(angle) * way)
                     due = np.degrees(angle[off[0]]) if off.size else np.nan
                     cells = []
@@ -213,7 +226,9 @@ def crests(options: argparse.Namespace) -> None:
                         at = np.nan
                         if offs.size:
                             at = np.degrees(np.arctan2(records.normal[offs[0], 0], records.normal[offs[0], 2]))
-                        far = np.flatnonzero((records.what == ON_GROUND) & (records.position[:, 0] > 60 * r + 2 * tangent))
+                        far = np.flatnonzero(
+                            (records.what == ON_GROUND) & (records.position[:, 0] > 60 * r + 2 * tangent)
+                        )
                         change = np.nan
                         if far.size:
                             begin, k = releases.position[0], far[0]
@@ -253,12 +268,21 @@ def started(ground: Ground, blocks: int, diameter: float) -> Releases:
     return make_releases(centre, velocity=np.tile(way, (blocks, 1)), diameter_m=diameter)
 
 
+def _error(values: np.ndarray) -> float:
+    """Standard error of the mean."""
+    return float(values.std() / np.sqrt(values.size))
+
+
 def meshes(options: argparse.Namespace) -> None:
-    print(f"smooth rough slope, roughness {options.roughness:g} of the wave length, {options.blocks} blocks, "
-          f"{options.law}, mu {options.friction[0]:g}: mean run-out in m ± standard error (impacts a block)")  # fmt: skip
+    print(f"smooth rough slope, roughness {options.roughness:g} of the wave length, {options.blocks} blocks, ", end="")
+    print(f"{options.law}, mu {options.friction[0]:g}: mean run-out in m ± standard error (impacts a block)")
     spacings = options.spacings
     grounds = {spacing: rough_ground(spacing, options.roughness, options.surface) for spacing in spacings}
-    print(f"{'model':<12}{'diameter':>9}" + "".join(f"{f'{spacing:g} m':>20}" for spacing in spacings) + "  largest/smallest")
+    print(
+        f"{'model':<12}{'diameter':>9}"
+        + "".join(f"{f'{spacing:g} m':>20}" for spacing in spacings)
+        + "  largest/smallest"
+    )
     for model in options.models:
         for diameter in options.diameters:
             cells, means = [], []
@@ -268,11 +292,21 @@ def meshes(options: argparse.Namespace) -> None:
                 run = simulate(grounds[spacing], releases, settings, record="ends", threads=1)
                 way = np.hypot(*(run.position - releases.position)[:, :2].T)
                 means.append(way.mean())
-                cells.append(f"{way.mean():>8.1f} ±{way.std() / np.sqrt(way.size):>4.1f} ({run.impacts.mean():>4.1f})")
+                cells.append(f"{way.mean():>8.1f} ±{_error(way):>4.1f} ({run.impacts.mean():>4.1f})")
             print(f"{model:<12}{diameter:>8.2f}m" + "".join(cells) + f"{max(means) / min(means):>12.3f}", flush=True)
 
 
 # ------------------------------------------------------------------------------------------------------------- tiles
+
+TILES = {
+    "demo": (0.12, 0.50, 2.0, 0.45),
+    "chablais": (0.35, 0.70, 5.0, 0.35),
+    "lareunion": (0.25, 0.65, 3.0, 0.45),
+    "tschamut": (0.33, 0.53, 2.0, 0.45),
+}
+"""Where blocks start and are measured, as parts of the way down the tile; their speed [m/s]; friction."""
+LOWEST_M = 2.0
+"""A scan whose ground is not classified: the lowest point of each cell of this side."""
 
 
 def cloud_of(name: str) -> np.ndarray:
@@ -291,8 +325,8 @@ def cloud_of(name: str) -> np.ndarray:
         points = np.asarray(las.xyz)
         if name == "chablais":
             points = points[np.asarray(las.classification) == 2]
-        else:  # not classified: the lowest of each half metre
-            cell = np.floor((points[:, :2] - points[:, :2].min(axis=0)) / 0.5).astype(int)
+        else:  # not classified
+            cell = np.floor((points[:, :2] - points[:, :2].min(axis=0)) / LOWEST_M).astype(int)
             order = np.lexsort((points[:, 2], cell[:, 1], cell[:, 0]))
             _, lowest = np.unique(cell[order], axis=0, return_index=True)
             points = points[order][lowest]
@@ -322,10 +356,12 @@ def tile(name: str, spacing: float, smooth: float) -> tuple[np.ndarray, np.ndarr
 
 def tiles(options: argparse.Namespace) -> None:
     for name in options.tiles:
-        print(f"\n{name}, {options.blocks} blocks from rest, mu {options.friction[0]:g}"
-              + (f", surface smoothed over {options.smooth:g} m" if options.smooth else ", cells as they come"))  # fmt: skip
-        print(f"{'model':<10}{'diameter':>9}{'grid':>7}{'run-out':>14}{'impacts':>9}{'reach':>7}{'v mean':>8}{'v 95%':>8}"
-              f"{'E mean':>9}{'E 95%':>9}{'left':>6}")  # fmt: skip
+        release, measured, speed, mu = TILES[name]
+        mu = options.friction[0] if options.friction else mu
+        print(f"\n{name}, {options.blocks} blocks that start with {speed:g} m/s, mu {mu:g}"
+              + (f", smoothed over {options.smooth:g} m" if options.smooth else ", cells as they come"))  # fmt: skip
+        print(f"{'model':<10}{'diameter':>9}{'grid':>7}{'run-out':>14}{'impacts':>9}{'reach':>7}{'v mean':>8}", end="")
+        print(f"{'v 95%':>8}{'E mean':>9}{'E 95%':>9}{'left':>6}")
         grounds = {}
         for spacing in options.spacings:
             x, y, z = tile(name, spacing, options.smooth)
@@ -342,9 +378,13 @@ def tiles(options: argparse.Namespace) -> None:
         across = np.array([-down[1], down[0]])
         rng = np.random.default_rng(3)
         span = high - low
-        top = middle + down * (low + 0.12 * span - middle @ down)
-        places = top + rng.uniform(-0.2, 0.2, (options.blocks, 1)) * span * across + rng.uniform(0, 0.05, (options.blocks, 1)) * span * down
-        here = middle + down * (low + 0.5 * span - middle @ down)
+        top = middle + down * (low + release * span - middle @ down)
+        places = (
+            top
+            + rng.uniform(-0.15, 0.15, (options.blocks, 1)) * span * across
+            + rng.uniform(0, 0.05, (options.blocks, 1)) * span * down
+        )
+        here = middle + down * (low + measured * span - middle @ down)
         screen = Screen("screen", np.array([here - 0.6 * span * across, here + 0.6 * span * across]))
         for model in options.models:
             for diameter in options.diameters:
@@ -353,17 +393,20 @@ def tiles(options: argparse.Namespace) -> None:
                     centre = placed_on(ground, places, np.full(len(places), diameter))
                     good = np.isfinite(centre).all(axis=1)
                     releases = make_releases(
-                        centre[good], velocity=np.tile([*(2 * down), 0.0], (good.sum(), 1)), diameter_m=diameter
+                        centre[good], velocity=np.tile([*(speed * down), 0.0], (good.sum(), 1)), diameter_m=diameter
                     )
-                    settings = Settings(MODELS[model], rolling=options.law, friction=options.friction[0], seed=1)
+                    settings = Settings(MODELS[model], rolling=options.law, friction=mu, seed=1)
                     run = simulate(ground, releases, settings, threads=1)
                     way = np.hypot(*(run.position - releases.position)[:, :2].T)
                     at = blocks_at(hits_at(run, [screen]))
                     v, energy = (at.speed_mps, at.energy_j / 1000) if len(at) else (np.full(1, np.nan),) * 2
-                    print(f"{model:<10}{diameter:>8.2f}m{spacing:>6.2f}m{way.mean():>7.1f} ±{way.std() / np.sqrt(way.size):>4.1f}"
-                          f"{run.impacts.mean():>9.1f}{len(at) / len(run):>7.2f}{v.mean():>8.2f}{np.quantile(v, 0.95):>8.2f}"
-                          f"{energy.mean():>9.3g}{np.quantile(energy, 0.95):>9.3g}"
-                          f"{(run.end == ENDS.index('left_terrain')).mean():>6.2f}", flush=True)  # fmt: skip
+                    left = (run.end == ENDS.index("left_terrain")).mean()
+                    print(
+                        f"{model:<10}{diameter:>8.2f}m{spacing:>6.2f}m{way.mean():>7.1f} ±{_error(way):>4.1f}", end=""
+                    )
+                    print(f"{run.impacts.mean():>9.1f}{len(at) / len(run):>7.2f}{v.mean():>8.2f}", end="")
+                    print(f"{np.quantile(v, 0.95):>8.2f}{energy.mean():>9.3g}{np.quantile(energy, 0.95):>9.3g}", end="")
+                    print(f"{left:>6.2f}", flush=True)
 
 
 # -------------------------------------------------------------------------------------------------------- thresholds
@@ -406,8 +449,8 @@ def constants() -> dict[str, float]:
 def thresholds(options: argparse.Namespace) -> None:
     there = constants()
     names = options.only or list(there)
-    more = ["meshes", "--blocks", str(options.blocks), "--spacings", *map(str, options.spacings), "--models", *options.models,
-            "--diameters", *map(str, options.diameters)]  # fmt: skip
+    more = ["meshes", "--blocks", str(options.blocks), "--spacings", *map(str, options.spacings)]
+    more += ["--models", *options.models, "--diameters", *map(str, options.diameters)]
     for name, value in [("none", 0.0), *((name, factor * there[name]) for name in names for factor in (0.5, 2.0))]:
         if name == "SHARP":  # a cosine: what is halved is the angle
             value = float(np.cos(np.arccos(there[name]) * value / there[name]))
@@ -456,12 +499,12 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--roughness", type=float, default=0.005, help="amplitude as a part of the wave length")
     one.add_argument("--surface", type=int, default=1, help="seed of the surface")
     one = table("tiles", tiles)
-    one.add_argument("--tiles", nargs="+", choices=["demo", "chablais", "lareunion", "tschamut"], default=["demo", "chablais"])
+    one.add_argument("--tiles", nargs="+", choices=list(TILES), default=list(TILES))
     one.add_argument("--spacings", **number, default=[0.1, 0.25, 0.5, 1.0], help="multiples of 0.05 m")
     one.add_argument("--models", nargs="+", choices=list(MODELS), default=["azimi", "noel"])
     one.add_argument("--diameters", **number, default=[0.3, 1.0])
     one.add_argument("--blocks", type=int, default=200)
-    one.add_argument("--friction", **number, default=[0.45])
+    one.add_argument("--friction", **number, default=[], help="for all tiles")
     one.add_argument("--law", default="azzoni_1995")
     one.add_argument("--smooth", type=float, default=0.0)
     one = table("thresholds", thresholds)

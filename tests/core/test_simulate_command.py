@@ -89,6 +89,21 @@ def test_tables_agree_with_each_other(terrain: Path, releases: Path, tmp_path: P
         assert (again / name).read_bytes() == (out / name).read_bytes()
 
 
+def test_what_a_finer_mesh_changes_is_said_and_written(terrain: Path, releases: Path, tmp_path: Path, capsys) -> None:
+    """Blocks of 0.4 and 0.6 m on waves of 6 m in steps of 2 m."""
+    plain = ["simulate", str(releases), "--terrain", str(terrain), "--model", "noel_2017", "--seed", "3"]
+    assert main([*plain, "--out", str(tmp_path / "plain")]) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"edges of [5-7](\.\d)? diameters", said)
+    assert "changes by" not in said
+    assert main([*plain, "--check-mesh", "--out", str(tmp_path / "checked")]) == 0
+    said = capsys.readouterr().out
+    assert "the mean run-out of 5 blocks changes by" in said
+    summary = json.loads((tmp_path / "checked" / "summary.json").read_text(encoding="utf-8"))
+    assert any("the mean run-out of 5 blocks changes by" in str(one) for one in summary["remarks"])
+    assert rows_of(tmp_path / "plain" / "runs.csv") == rows_of(tmp_path / "checked" / "runs.csv")
+
+
 def test_several_models_get_the_same_blocks(terrain: Path, releases: Path, tmp_path: Path) -> None:
     argv = ["simulate", str(releases), "--terrain", str(terrain), "--seed", "3"]
     for models in (["noel_2017"], ["stevens_1998"], ["noel_2017", "stevens_1998"]):

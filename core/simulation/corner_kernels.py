@@ -12,8 +12,6 @@ loss goes with T²: n edges of T/n lose 1/n of it, and a concave arc on which th
 
 from math import acos, sqrt
 
-import numpy as np
-
 from ..compiled import borrowing as kernel
 from .facet_kernels import bend_angle, corner, cross, dot, minus
 

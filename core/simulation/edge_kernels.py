@@ -143,6 +143,23 @@ def keeps(facets, corners, i, j, v, n, m, radius, gravity, hop):  # type: ignore
 
 
 @kernel
+def turns_about(tree, facets, i, e, v, radius, gravity):  # type: ignore[no-untyped-def]
+    """Whether a block turns about the edge or corner of triangle i that it touches, with the normal e of the contact.
+
+    At a crease it turns about one place, which it leaves where v² > g r; at a border there is nothing beyond. Within a
+    triangle, and where the surface is curved, there is no such place.
+    """
+    corners = tree[3]
+    m = upward(corners, i)
+    if dot(e, m) > 1.0 - 1e-9:
+        return True
+    share = 1.0 if min(min(facets[0][i, 0], facets[0][i, 1]), facets[0][i, 2]) < 0 else share_of_crease(
+        facets, corners, i, i, v, m
+    )
+    return share * share * dot(v, v) <= gravity * max(e[2], 0.0) * radius
+
+
+@kernel
 def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, hop, shortest):  # type: ignore[no-untyped-def]
     """Over an edge beyond which the ground falls: about it, or in a hop.
 

@@ -30,7 +30,7 @@ from .chance_kernels import ATTITUDE, fill_uniform
 from .contact_kernels import TOUCHING_M, inlined, last_root
 from .corner_kernels import FREE, FUZZY, angle_between, met, share_of_crease, share_of_wall
 from .drag_kernels import DRAG_CHANGE, with_drag
-from .edge_kernels import keeps, onto, over
+from .edge_kernels import keeps, onto, over, turns_about
 from .facet_kernels import NOWHERE
 from .ground_kernels import box, first_contact
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE, leg
@@ -409,7 +409,11 @@ def run_block(  # type: ignore[no-untyped-def]
                 if len(tree) == 6 and not leaves:
                     down = (-n[0], -n[1], -n[2])
                     drop, e, hit = first_contact(tree, stack, times, free, down, zero, radius, radius)
-                if drop < inf and keeps(facets, tree[3], place, hit, v, n, e, radius, gravity, HOP * radius):
+                if (
+                    drop < inf
+                    and keeps(facets, tree[3], place, hit, v, n, e, radius, gravity, HOP * radius)
+                    and turns_about(tree, facets, hit, e, v, radius, gravity)
+                ):
                     q, turned, t, moves = _at(free, down, zero, drop)[0], v, dt, True
                 else:
                     t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)

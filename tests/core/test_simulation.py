@@ -152,7 +152,7 @@ def test_a_block_at_rest_begins_to_roll_where_the_slope_is_steep_enough(degrees:
 @pytest.mark.parametrize(
     "height",
     [
-        lambda x: 30 - 0.42 * np.minimum(x, 30),
+        lambda x: 17.4 + 0.84 * np.logaddexp(0.0, (30 - x) / 2.0),
         lambda x: 30 * np.exp(-x / 30),
         lambda x: 20 + 10 * np.cos(np.minimum(x, 60) * np.pi / 60),
     ],

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Terrains with faults: how blocks meet them, and that they are counted and said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
@@ -48,7 +50,9 @@ def same(one: Simulation, other: Simulation) -> None:
     first = [np.flatnonzero((run.records.what == IMPACT) & (run.records.time_s < 1.5)) for run in (one, other)]
     assert len(first[0]) == len(first[1]) >= 60
     np.testing.assert_allclose(one.records.position[first[0]], other.records.position[first[1]], atol=1e-6)
-    np.testing.assert_allclose(np.sort(one.position, axis=0), np.sort(other.position, axis=0), atol=0.05)
+    apart = np.linalg.norm(one.position - other.position, axis=1)
+    assert (apart < 0.05).mean() > 0.9
+    assert apart.max() < 1.0
 
 
 def texts(simulation: Simulation) -> list[str]:
@@ -115,9 +119,10 @@ def test_a_wall_on_an_edge_of_the_terrain_is_met() -> None:
     branching = sheet(np.concatenate([surface.vertices, top]), faces)
     assert ground_faults(branching).branching_edges == 3
     start = np.array([[10.0, 17.0, -4.0]])
-    run = simulate(make_ground(branching), make_releases(start, diameter_m=0.5), SETTINGS)
+    smooth = replace(SETTINGS, friction=0.2)
+    run = simulate(make_ground(branching), make_releases(start, diameter_m=0.5), smooth)
     assert run.position[0, 0] < 24.0
-    assert simulate(make_ground(surface), make_releases(start, diameter_m=0.5), SETTINGS).position[0, 0] > 39.0
+    assert simulate(make_ground(surface), make_releases(start, diameter_m=0.5), smooth).position[0, 0] > 39.0
     assert "Edges of more than two triangles: 3; blocks meet each of them." in texts(run)
 
 

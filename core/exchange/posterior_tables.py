@@ -110,6 +110,10 @@ def back_analysis_content(analysis: BackAnalysis, inputs: dict[str, Path]) -> di
         "gravity_mps2": settings.gravity_mps2,
         "seed": settings.seed,
         "observed_runs": analysis.observed.names.tolist(),
+        "completeness": analysis.completeness.text or "not stated",
+        "falls": analysis.falls,
+        "short_runs": None if analysis.short_runs is None else _plain(asdict(analysis.short_runs)),
+        "if_only_the_longest_were_observed": None if analysis.if_longest is None else asdict(analysis.if_longest),
         "simulated_runs": analysis.runs,
         "seconds": round(analysis.seconds, 1),
         "draws": len(analysis.draws),
@@ -123,7 +127,15 @@ def back_analysis_content(analysis: BackAnalysis, inputs: dict[str, Path]) -> di
             for name, row in zip(names, analysis.correlation.tolist(), strict=True)
         },
         "predictive": [_plain({**asdict(one), "fits": one.fits}) for one in analysis.checks],
-        "held_out": [_plain(asdict(fold)) for fold in analysis.folds],
+        "held_out": [_plain(asdict(fold)) for fold in analysis.prediction.folds],
+        "held_out_quantities": [_plain({**asdict(one), "helps": one.helps}) for one in analysis.prediction.quantities],
+        "better_than_observed_alone": _plain(
+            {
+                "gain": analysis.prediction.gain,
+                "error": analysis.prediction.error,
+                "is_clear": analysis.prediction.is_clear,
+            }
+        ),
         "remarks": to_plain(analysis.remarks),
     }
 

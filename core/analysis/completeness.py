@@ -97,8 +97,8 @@ def names_that_fell(stated: Completeness, observed: Names, released: Names) -> N
     number = stated.falls or known.size
     if stated.falls is None and not others.size:
         raise InputError(
-            f"The {len(observed)} observed runs are the longest of how many falls?",
-            advice="State it: longest:N; or give the releases of all blocks that fell",
+            f"The {len(observed)} observed runs are the longest, and it is not stated of how many falls",
+            advice="Write longest:N, or give the releases of all blocks that fell",
         )
     if number < known.size:
         what = f"{known.size} blocks that were released" if others.size else f"{known.size} observed runs"

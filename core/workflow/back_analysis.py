@@ -311,7 +311,13 @@ class _Work:
         return np.concatenate(parts)
 
     def seen(self, values: Array, scales: Scales, first: int, least: float = LEAST_ERROR) -> Array:
-        """(S, n, Q) values as they would have been observed, of sets from the number `first` on; see `with_errors`."""
+        """(S, n, Q) values as they would have been observed, of sets from the number `first` on; see `with_errors`.
+
+        Those of the longest have their own errors alone: others would change which are the longest, and the scatter of
+        a few ranks, and with it what fits.
+        """
+        if self.by_rank:
+            least = 0.0
         return with_errors(self.values, scales, values, np.random.default_rng([self.settings.seed, 19, first]), least)
 
     def _chunk(self, sets: Array | None, first: int, size: int, total: int) -> Array:

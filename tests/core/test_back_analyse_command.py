@@ -111,6 +111,45 @@ def test_stops_alone(site: Path, tmp_path: Path, capsys) -> None:
     assert {one["quantity"] for one in content["predictive"]} == {"runout_m", "energy_line_deg", "stop_aside_m"}
     assert content["friction_set"] is None
     assert not (out / "figures").exists()
+    assert content["completeness"] == "not stated"
+    assert "It is not stated whether all falls were recorded" in said
+    assert "runs held out, mean CRPS" in said
+    run_out = next(one for one in content["held_out_quantities"] if one["quantity"] == "runout_m")
+    values = np.array([np.hypot(float(row["x_m"]) - EAST - 6, 0.0) for row in rows_of(site / "stops.csv")])
+    alone = np.mean(  # six runs in five parts: by hand, where each is left out alone
+        [np.abs(np.delete(values, i) - values[i]).mean() - _half_gini(np.delete(values, i)) for i in range(RUNS)]
+    )
+    assert run_out["observed_alone"] == pytest.approx(alone, rel=0.25)
+    verdict = " ".join(one["text"] for one in content["remarks"] if one["about"] == "fit")
+    assert f"run-out {run_out['observed_alone']:.3g} without it, {run_out['fitted']:.3g} m with" in verdict
+    assert set(content["better_than_observed_alone"]) == {"gain", "error", "is_clear"}
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def _half_gini(values: np.ndarray) -> float:
+    return float(np.abs(values[:, None] - values).mean() / 2)
+
+
+def test_the_longest_of_all_releases(site: Path, tmp_path: Path, capsys) -> None:
+    """Three of the six stops, and the releases of all six."""
+    stops = rows_of(site / "stops.csv")
+    farthest = sorted(stops, key=lambda row: -float(row["x_m"]))[:3]
+    few = tmp_path / "few.csv"
+    few.write_text("release,x_m,y_m\n" + "".join(f"{','.join(row.values())}\n" for row in farthest), encoding="utf-8")
+    more = ["--stops", str(few), "--fit", "friction", "--sets", "150", "--rounds", "1", "--tables-only"]
+    for i, (stated, falls) in enumerate((("longest", 6), ("longest:7", 7))):
+        out = tmp_path / f"out{i}"
+        argv = asked(site, out, *more, "--completeness", stated, observed="releases.csv")
+        assert main(argv) == 0
+        content = json.loads((out / "back_analysis.json").read_text(encoding="utf-8"))
+        assert (content["completeness"], content["falls"]) == (f"longest:{falls}", falls)
+        assert content["observed_runs"] == [row["release"] for row in farthest]
+        assert content["simulated_runs"] == falls * (150 + 1000)
+        assert f"compared with the longest of {falls} that fall" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(
@@ -122,6 +161,9 @@ def test_stops_alone(site: Path, tmp_path: Path, capsys) -> None:
         (["--fit", "rn", "--set", f"{MODEL}.rn=0.4"], "rn is both fitted and set. Leave"),
         (["--fit", "friction", "--friction", "0.4"], "friction is both fitted and set. Leave"),
         (["--fit", "rn", "--sets", "10"], "are too few. Give"),
+        (["--fit", "rn", "--completeness", "all"], "says nothing of whether all falls were recorded. Write complete"),
+        (["--fit", "rn", "--completeness", "longest"], "it is not stated of how many falls. Write longest:N"),
+        (["--fit", "rn", "--completeness", "longest:9"], "not seen to its stop. Give its stop"),
     ],
 )
 def test_bad_input(site: Path, tmp_path: Path, capsys, more: list[str], problem: str) -> None:

@@ -42,7 +42,7 @@ def commands(folder: Path) -> dict[str, list[str]]:
         "reconstruct": ["reconstruct", project],
         "demo": ["demo", "--no-film"],
         "refine": ["refine", str(DEMO / "footage" / "project.toml")],
-        "align": ["align", str(DEMO / "footage" / "pairs.csv"), "--terrain", str(DEMO / "terrain.ply"), "--size", "1280x720"],
+        "align": ["align", str(DEMO / "footage" / "pairs.csv"), "--size", "1280x720"],
         "simulate": many,
         "simulate with maps": [*many, "--cell", "1", "--record", "none"],
         "back-analyse": [
@@ -75,10 +75,10 @@ def _dispatched() -> list[str]:
     return [name for name in __cpu_dispatch__ if __cpu_features__.get(name)]
 
 
-def run(words: Sequence[str], out: Path, variables: Mapping[str, str]) -> None:
-    """Run a command; its kernels are kept apart for each kind of code."""
-    kept = KERNELS / (variables.get("NUMBA_CPU_NAME") or "own")
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(kept)} | dict(variables)
+def run(words: Sequence[str], out: Path, variables: Mapping[str, str], kernels: Path | None = KERNELS) -> None:
+    """Run a command; its kernels are kept apart for each kind of code, or where they always are without a folder."""
+    kept = {} if kernels is None else {"NUMBA_CACHE_DIR": str(kernels / (variables.get("NUMBA_CPU_NAME") or "own"))}
+    environment = os.environ | kept | dict(variables)
     done = subprocess.run(
         [sys.executable, "-c", START, *words, "--out", str(out)],
         env=environment, capture_output=True, text=True, check=False,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a posterior is worth: intervals, whether the model gives what was observed, and words."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -252,6 +252,11 @@ def posterior_remarks(
         text = f"{model} can give what was observed in all {len(checks)} quantities. {prediction.verdict(model)}"
         yield Remark(text, "note" if prediction.helps else "warning", "fit")
     yield from prediction.remarks(model)
+
+
+def doubts_of(remarks: Iterable[Remark]) -> tuple[str, ...]:
+    """What speaks against carrying a posterior on: a model that does not fit or predict, runs that are not all."""
+    return tuple(str(one) for one in remarks if one.severity == "warning" and one.about in ("fit", "completeness"))
 
 
 def _short(value: float) -> str:

@@ -34,6 +34,7 @@ from ..analysis.posterior_checks import (
     PosteriorEstimate,
     PredictiveCheck,
     correlations,
+    doubts_of,
     estimates_of,
     posterior_remarks,
     predictive_checks,
@@ -189,18 +190,17 @@ def back_analyse(
         if completeness.kind in ("complete", "longest")
         else _if_longest(priors, posterior_if_longest(values, table, simulated, sets))
     )
-    remarks = posterior_remarks(
-        find_model(settings.model).title, len(values), estimates, checks, prediction, found.effective
-    )
-    told = completeness_remarks(completeness, short_runs, if_longest, len(values))
+    title = find_model(settings.model).title
+    remarks = [*posterior_remarks(title, len(values), estimates, checks, prediction, found.effective)]
+    remarks += completeness_remarks(completeness, short_runs, if_longest, len(values))
     draws = ParameterDraws(
         tuple(prior.name for prior in priors), _values_at(priors, found.place), found.weight,
-        before=tuple(f"{one.prior}: {one.left}" for one in estimates),
+        before=tuple(f"{one.prior}: {one.left}" for one in estimates), doubts=doubts_of(remarks),
     )  # fmt: skip
     return BackAnalysis(
         settings.model, settings, tuple(priors), values, draws, correlations(priors, found), estimates, checks,
         prediction, predicted, found.effective, total * fell.size, time.perf_counter() - started, completeness,
-        fell.size, short_runs, if_longest, tuple(gravest_first([*releases.remarks, *remarks, *told])),
+        fell.size, short_runs, if_longest, tuple(gravest_first([*releases.remarks, *remarks])),
     )  # fmt: skip
 
 

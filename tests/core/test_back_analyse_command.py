@@ -221,6 +221,24 @@ def test_blocks_draw_their_parameters_from_the_posterior(site: Path, analysed: P
     assert "drawn_" not in (tmp_path / "set" / "runs.csv").read_text(encoding="utf-8")
 
 
+def test_what_speaks_against_a_posterior_goes_with_it(site: Path, analysed: Path, tmp_path: Path, capsys) -> None:
+    """From back_analysis.json beside the table into what `simulate` says; what speaks for it does not."""
+    content = json.loads((analysed / "back_analysis.json").read_text(encoding="utf-8"))
+    doubt = "The other observed runs alone predict the runs held out better."
+    content["remarks"] = [
+        {"text": doubt, "severity": "warning", "about": "fit"},
+        {"text": "All well.", "severity": "note", "about": "fit"},
+    ]
+    (tmp_path / "back_analysis.json").write_text(json.dumps(content), encoding="utf-8")
+    (tmp_path / "posterior.csv").write_bytes((analysed / "posterior.csv").read_bytes())
+    assert read_posterior(tmp_path / "posterior.csv")[1].doubts == (doubt,)
+    posterior = ["--posterior", str(tmp_path / "posterior.csv"), "--model", MODEL, "--record", "none"]
+    assert main(simulated(site, tmp_path / "out", *posterior)) == 0
+    assert f"The back-analysis: {doubt}" in " ".join(capsys.readouterr().out.split())
+    (tmp_path / "back_analysis.json").unlink()
+    assert read_posterior(tmp_path / "posterior.csv")[1].doubts == ()
+
+
 def test_a_project_names_its_posterior(site: Path, analysed: Path, tmp_path: Path, capsys) -> None:
     text = f"""
 schema = 1

@@ -28,8 +28,8 @@ ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "assets" / "demo"
 KERNELS = ROOT / "build" / "kernels_of_processors"
 START = "import sys; from rockfall.core.cli import main; sys.exit(main(sys.argv[1:]))"
-TIMES = ("seconds", "version", "wall_s", "inputs")
-"""Of JSON files: keys that do not belong to the result."""
+TIMES = ("seconds", "blocks_per_s", "version", "inputs", "remarks")
+"""Of JSON files: keys that do not belong to the result, or are told in words."""
 SMALL = 1e-9
 """Of the greatest number of a column: what differs by less of it is counted as rounding."""
 

@@ -167,7 +167,7 @@ def compared(first: Path, second: Path) -> str:
     pictures = f"; {len(texts)} pictures" if texts else ""
     if not differ:
         return "same" + pictures
-    size = "another outcome" if math.isinf(worst) else f"≤ {worst:.0e}"
+    size = "some another way" if math.isinf(worst) else f"≤ {worst:.0e}"
     return f"{differ} of {total}, {size}{pictures}"
 
 

@@ -37,7 +37,7 @@ def test_what_differs_is_counted(processors, tmp_path: Path) -> None:
     zero = written(tmp_path / "e", "runs.csv", "name,x_m\nA,100\nB,0.5\nC,1e-17\n")
     assert processors.difference(rounding / "runs.csv", zero / "runs.csv")[2] == pytest.approx(1e-10)
     lost = written(tmp_path / "f", "runs.csv", "name,x_m\nA,100\n")
-    assert processors.compared(first, lost) == "1 of 1, another outcome"
+    assert processors.compared(first, lost) == "1 of 1, some another way"
     named = written(tmp_path / "g", "runs.csv", "name,x_m\nA,100\nC,0.5\n")
     assert math.isinf(processors.difference(first / "runs.csv", named / "runs.csv")[2])
     assert processors.compared(first, written(tmp_path / "h", "hits.csv", "a\n")) == "other files"

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a posterior is worth: intervals, whether the model gives what was observed, runs held out, and words."""
+"""What a posterior is worth: intervals, whether the model gives what was observed, and words."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..remarks import Remark
-from ..vectors import Array, Indices
-from .likelihood_free import Posterior, SimulatedSets, find_posterior, weighted_quantiles
+from ..vectors import Array
+from .held_out import Prediction
+from .likelihood_free import Posterior
 from .priors import Prior
 from .ranks import FEWEST, holm
-from .run_statistics import ObservedValues, Scales, crps, find_scales, plain_means, statistics_of, tails
+from .run_statistics import ObservedValues, Scales, plain_means, statistics_of, tails
 from .verdicts import TOGETHER
 
 INTERVAL = np.array([0.025, 0.25, 0.5, 0.75, 0.975])
@@ -23,11 +24,9 @@ EDGE, PILED = 0.05, 4.0
 """The posterior piles up at an end of the range where the outermost part has so many times its prior probability."""
 UNLIKELY = 0.05
 """Of the corrected probability of what was observed."""
-FOLDS = 5
 FEWEST_COVERED = 0.85
 """Of known parameters within their 95 % intervals; with fewer the intervals are said to be too narrow."""
 NOTHING = 1e-9
-NINETY = np.array([0.05, 0.95])
 
 
 @dataclass(frozen=True)
@@ -109,26 +108,6 @@ class PredictiveCheck:
     def fits(self) -> bool:
         """Whether the model can give it."""
         return not self.p_holm < UNLIKELY
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """Runs that were predicted from the others.
-
-    Attributes
-    ----------
-    names : of the runs. values : how many of theirs were predicted.
-    fitted, default, prior : mean scores (CRPS in robust standard deviations, 0 is perfect) with the posterior of the
-        others, with the parameters as they were set, with parameters drawn from the prior.
-    inside : of the values within the predicted 90 % interval.
-    """
-
-    names: tuple[str, ...]
-    values: int
-    fitted: float
-    default: float
-    prior: float
-    inside: int
 
 
 def estimates_of(priors: Sequence[Prior], found: Posterior, places: Array) -> tuple[PosteriorEstimate, ...]:
@@ -234,75 +213,17 @@ def predictive_checks(observed: ObservedValues, simulated: Array, scales: Scales
     return tuple(made)
 
 
-def hold_out(
-    observed: ObservedValues, table: SimulatedSets, values: Array, prior_sets: int, default: Array, seed: int
-) -> tuple[HeldOut, ...]:
-    """Each part of the runs predicted from the posterior of the others.
-
-    Parameters
-    ----------
-    values : (N, n, Q) of the sets in the table, the first `prior_sets` of them from the prior.
-    default : (S, n, Q) simulated with the parameters as they were set.
-    """
-    n = len(observed)
-    if n < 2:
-        return ()
-    parts = np.array_split(np.random.default_rng([seed, 20]).permutation(n), min(FOLDS, n))
-    scales = find_scales(values[:prior_sets])
-    made = []
-    for part in parts:
-        others = np.setdiff1d(np.arange(n), part)
-        seen = observed.seen[others]
-        if not np.isfinite(observed.value[others]).any() or not np.isfinite(observed.value[part]).any():
-            continue
-        own = Scales(scales.centre[others], scales.spread[others])
-        statistics = statistics_of(values[:, others], own, seen)
-        reduced = SimulatedSets(table.place, table.weight, statistics)
-        found = find_posterior(reduced, statistics_of(observed.value[others], own, seen))
-        made.append(_predicted(observed, part, values, found, prior_sets, default, scales))
-    return tuple(made)
-
-
-def _predicted(
-    observed: ObservedValues,
-    part: Indices,
-    values: Array,
-    found: Posterior,
-    prior_sets: int,
-    default: Array,
-    scales: Scales,
-) -> HeldOut:
-    """The score of the runs `part`, from the sets that the posterior of the others took."""
-    scores, inside = [], 0
-    for run in part.tolist():
-        for column in np.flatnonzero(np.isfinite(observed.value[run])).tolist():
-            seen, spread = float(observed.value[run, column]), float(scales.spread[run, column])
-            samples = (
-                (values[found.source, run, column], found.weight),
-                (default[:, run, column], np.ones(len(default))),
-                (values[:prior_sets, run, column], np.ones(prior_sets)),
-            )
-            known = [np.isfinite(sample) for sample, _ in samples]
-            if any(there.sum() < FEWEST for there in known):
-                continue
-            scores.append(
-                [
-                    crps(sample[there], weight[there], seen) / spread
-                    for (sample, weight), there in zip(samples, known, strict=True)
-                ]
-            )
-            low, high = weighted_quantiles(samples[0][0][known[0]], found.weight[known[0]], NINETY)
-            inside += int(low <= seen <= high)
-    means = np.mean(scores, axis=0).tolist() if scores else [np.nan] * 3
-    names = tuple(observed.names[part].tolist())
-    return HeldOut(names, len(scores), means[0], means[1], means[2], inside)
-
-
 def posterior_remarks(
     model: str, runs: int, estimates: Sequence[PosteriorEstimate], checks: Sequence[PredictiveCheck],
-    folds: Sequence[HeldOut], effective: float,
+    prediction: Prediction, effective: float,
 ) -> Iterator[Remark]:  # fmt: skip
-    """What the result is worth, the bad news first."""
+    """What the result is worth, the bad news first.
+
+    Notes
+    -----
+    That the model can give what was observed is never said without how well it predicts runs that it has not seen,
+    beside what the observed runs alone predict.
+    """
     wrong = [one for one in checks if not one.fits]
     if wrong:
         named = ", ".join(
@@ -311,7 +232,8 @@ def posterior_remarks(
         )
         text = (
             f"No parameters within these ranges make {model} give what was observed in {len(wrong)} of {len(checks)} "
-            f"quantities: {named}. The intervals are those of a model that does not fit; do not design with them."
+            f"quantities: {named}. The intervals are those of a model that does not fit; do not design with them. "
+            f"{prediction.verdict(model)}"
         )
         yield Remark(text, "warning", "fit")
     unsure = [one.name for one in estimates if not one.is_determined]
@@ -327,30 +249,16 @@ def posterior_remarks(
         text = f"The posterior rests on {effective:.0f} sets of parameters: take more sets, or more rounds."
         yield Remark(text, "warning", "sets")
     if not wrong and checks:
-        yield Remark(f"{model} can give what was observed in all {len(checks)} quantities.", "note", "fit")
-    yield from _about_held_out(model, folds)
+        text = f"{model} can give what was observed in all {len(checks)} quantities. {prediction.verdict(model)}"
+        yield Remark(text, "note" if prediction.helps else "warning", "fit")
+    yield from prediction.remarks(model)
+
+
+def doubts_of(remarks: Iterable[Remark]) -> tuple[str, ...]:
+    """What speaks against carrying a posterior on: a model that does not fit or predict, runs that are not all."""
+    return tuple(str(one) for one in remarks if one.severity == "warning" and one.about in ("fit", "completeness"))
 
 
 def _short(value: float) -> str:
     """Three digits, without the rounding of what is zero."""
     return f"{0.0 if abs(value) < NOTHING else value:.3g}"
-
-
-def _about_held_out(model: str, folds: Sequence[HeldOut]) -> Iterator[Remark]:
-    values = sum(fold.values for fold in folds)
-    if not values:
-        return
-    fitted, default, prior = (
-        sum(getattr(fold, name) * fold.values for fold in folds if fold.values) / values
-        for name in ("fitted", "default", "prior")
-    )
-    inside = sum(fold.inside for fold in folds)
-    text = (
-        f"Runs held out: {100 * inside / values:.0f} % of {values} values lie in the predicted 90 % interval; score "
-        f"{fitted:.3f} fitted, {default:.3f} with {model} as it was set, {prior:.3f} with anything thought possible "
-        "(0 is perfect)."
-    )
-    yield Remark(text, "note" if fitted <= default else "warning", "hold-out")
-    if fitted > default:
-        text = "The fit predicts runs that it has not seen no better than the parameters as they were set."
-        yield Remark(text, "warning", "hold-out")

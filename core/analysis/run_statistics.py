@@ -78,12 +78,15 @@ class Scales:
         return np.clip((values - self.centre) / self.spread, -MOST, MOST)
 
 
-def with_errors(observed: ObservedValues, scales: Scales, values: Array, rng: np.random.Generator) -> Array:
+def with_errors(
+    observed: ObservedValues, scales: Scales, values: Array, rng: np.random.Generator, least: float = LEAST_ERROR
+) -> Array:
     """Simulated values (S, n, Q) with random errors as of the observed ones, NaN where a run cannot count.
 
-    No value is taken to be known better than `LEAST_ERROR` of how far all simulations spread: a model is never exact.
+    No value is taken to be known better than the part `least` of how far all simulations spread: a model is never
+    exact.
     """
-    sigma = np.maximum(np.nan_to_num(observed.sigma), LEAST_ERROR * scales.spread)
+    sigma = np.maximum(np.nan_to_num(observed.sigma), least * scales.spread)
     return np.where(observed.seen, values + sigma * rng.standard_normal(values.shape), np.nan)
 
 

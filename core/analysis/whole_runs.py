@@ -19,6 +19,7 @@ from .observed_runs import Observed
 from .paths import Paths
 from .ranks import FEWEST, RankTest, holm, rank_test, reach_test
 from .run_measures import QUANTITIES, REACH, Limits, Quantity, errors_of, measure_runs
+from .run_statistics import crps
 from .sections import Axis, Section, axis_of, crossings
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -35,6 +36,8 @@ class Compared:
     observed, sigma : (n,) of each observed run, NaN where there is none; sigma is NaN where it is not known.
     count, quantiles : (n,) and (n, 5) of the simulated values of the same release, see `QUANTILES`.
     simulated, all_quantiles : (s,) all simulated values of the releases with an observed one, and their (5,) quantiles.
+    score, alone : mean CRPS (0 is perfect, in the unit of the quantity) of the simulated values for the observed ones,
+        and of the values of the other observed runs, without a model; NaN where nothing can be predicted.
     test : None for a quantity that is not tested.
     p, p_holm : probability that the observed come from the simulated; the latter corrected for all tests of the model.
     """
@@ -48,6 +51,8 @@ class Compared:
     quantiles: Array
     simulated: Array
     all_quantiles: Array
+    score: float
+    alone: float
     test: RankTest | None
     p: float
     p_holm: float = np.nan
@@ -71,11 +76,29 @@ class Compared:
             what = "observed" if self.n < FEWEST else "with enough simulated"
             return f"too few {what} to tell ({self.test.n if self.test else self.n}, not {FEWEST})"
         if not self.differs:
-            return f"no difference seen (p = {self.p:.2g})"
+            return f"no difference seen (p = {self.p:.2g}); {self.forecast}"
         if self.test is None:
-            return f"differs (p = {self.p_holm:.2g})"
+            return f"differs (p = {self.p_holm:.2g}); {self.forecast}"
         lower = 100 * float(np.nanmedian(self.test.place))
-        return f"differs (p = {self.p_holm:.2g}): the median observed is above {lower:.0f} % of the simulated"
+        above = f"the median observed is above {lower:.0f} % of the simulated"
+        return f"differs (p = {self.p_holm:.2g}): {above}; {self.forecast}"
+
+    @property
+    def helps(self) -> bool:
+        """Whether the model predicts it better than the other observed runs alone."""
+        return self.score < self.alone
+
+    @property
+    def forecast(self) -> str:
+        """How well it is predicted with the model and without it, in words."""
+        if np.isnan(self.score):
+            return "nothing to predict it from"
+        unit = f" {self.quantity.unit}" if self.quantity.unit else ""
+        better = "better" if self.helps else "worse"
+        return (
+            f"predicted {better} than by the other observed runs alone ({self.score:.3g}{unit} with the model, "
+            f"{self.alone:.3g}{unit} without)"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +152,7 @@ def whole_run_remarks(comparison: WholeRuns) -> tuple[Remark, ...]:
         where = f" at {clearest.section}" if clearest.section else ""
         what = f"{clearest.quantity.title}{where} (p = {clearest.p:.2g}, corrected {clearest.p_holm:.2g}"
         what += f"{_medians(clearest)})"
+        forecast, helps = _forecast(known)
         if differ:
             text = f"{title} differs from what was observed in {differ} of {len(known)} tests, most in {what}."
         else:
@@ -137,8 +161,27 @@ def whole_run_remarks(comparison: WholeRuns) -> tuple[Remark, ...]:
                 f"{title}: no difference seen in {len(known)} tests, of {few} runs and more: a difference that is "
                 f"small beside their scatter would not show. The least probable is {what}."
             )
-        remarks.append(Remark(text, "note", model))
+        remarks.append(Remark(f"{text} {forecast}", "note" if helps else "warning", model))
     return tuple(remarks)
+
+
+def _forecast(tests: Sequence[Compared]) -> tuple[str, bool]:
+    """How the model predicts beside the other observed runs alone, and whether better in more than half."""
+    known = [one for one in tests if np.isfinite(one.score)]
+    if not known:
+        return "Nothing shows how well it predicts.", False
+    worse = [one for one in known if not one.helps]
+    told = max(known, key=lambda one: (one.quantity.name == "runout_m", one.score / max(one.alone, 1e-12)))
+    unit = f" {told.quantity.unit}" if told.quantity.unit else ""
+    where = f" at {told.section}" if told.section else ""
+    amounts = (
+        f"{told.quantity.title}{where} to {told.alone:.3g}{unit} without the model, {told.score:.3g}{unit} with it"
+    )
+    if 2 * len(worse) < len(known):
+        text = f"It predicts {len(known) - len(worse)} of {len(known)} quantities better than the other observed runs"
+        return f"{text} alone do ({amounts}).", True
+    text = f"The other observed runs alone predict {len(worse)} of {len(known)} quantities better than it does"
+    return f"{text} ({amounts}).", False
 
 
 def _medians(one: Compared) -> str:
@@ -212,10 +255,28 @@ def _compare(
     some = [part for part, there in zip(parts, known.tolist(), strict=True) if there]
     together = np.concatenate(some) if some else np.zeros(0)
     count, quantiles = np.array([part.size for part in parts]), np.stack([_quantiles(part) for part in parts])
+    score, alone = _scores(observed, np.split(as_seen, borders))
     return Compared(
-        model, section, quantity, observed, sigma, count, quantiles, together, _quantiles(together), test,
+        model, section, quantity, observed, sigma, count, quantiles, together, _quantiles(together), score, alone, test,
         test.p if test else np.nan,
     )  # fmt: skip
+
+
+def _scores(observed: Array, simulated: Sequence[Array]) -> tuple[float, float]:
+    """Mean scores of observed values (n,) by the simulated ones of each, and by the other observed ones.
+
+    Both are of those values alone that each can predict.
+    """
+    known = np.flatnonzero(np.isfinite(observed))
+    scores = []
+    for i in known.tolist():
+        others = observed[known[known != i]]
+        own = simulated[i][np.isfinite(simulated[i])]
+        if own.size >= FEWEST and others.size:
+            value = float(observed[i])
+            scores.append([crps(each, np.ones(each.size), value) for each in (own, others)])
+    score, alone = np.mean(scores, axis=0).tolist() if scores else (np.nan, np.nan)
+    return score, alone
 
 
 def _reach(model: str, section: Section, paths: Paths, runs: Paths, axis: Axis, place: Indices) -> Compared:
@@ -232,10 +293,19 @@ def _reach(model: str, section: Section, paths: Paths, runs: Paths, axis: Axis, 
     nothing[:, 2] = np.bincount(place, their.crosses, len(paths)) / np.maximum(number, 1)
     mean = np.full(len(QUANTILES), np.nan)
     mean[2] = nothing[among, 2].mean() if among.any() else np.nan
+    score, alone = _reach_scores(observed[known & among], nothing[known & among, 2])
     unknown = np.full(len(paths), np.nan)
     return Compared(
-        model, section.name, REACH, observed, unknown, number, nothing, np.zeros(0), mean, None, p
+        model, section.name, REACH, observed, unknown, number, nothing, np.zeros(0), mean, score, alone, None, p
     )  # fmt: skip
+
+
+def _reach_scores(reached: Array, share: Array) -> tuple[float, float]:
+    """As `_scores`, of blocks that reach a section (1) or not (0); of two outcomes the CRPS is a square (Brier)."""
+    if reached.size < 2:
+        return np.nan, np.nan
+    others = (reached.sum() - reached) / (reached.size - 1)
+    return float(((share - reached) ** 2).mean()), float(((others - reached) ** 2).mean())
 
 
 def _quantiles(values: Array) -> Array:

@@ -76,7 +76,8 @@ def run(arguments: argparse.Namespace) -> int:
         with stopped_by_interrupt(progress) as counted:
             done = back_analyse(
                 case.ground, case.observed, case.releases, settings, priors, sections,
-                sets=arguments.sets, rounds=arguments.rounds, threads=arguments.threads, progress=counted,
+                sets=arguments.sets, rounds=arguments.rounds, completeness=case.completeness,
+                threads=arguments.threads, progress=counted,
             )  # fmt: skip
         progress("Writing the tables")
         write_posterior(model.name, done.draws, folder / "posterior.csv")
@@ -120,7 +121,20 @@ def _summary(done: "BackAnalysis", friction: float) -> list[str]:
         lines += wrapped(one.verdict, "    ")
     if all(one.name != "friction" for one in done.estimates):
         lines.append(f"friction was {friction:g} throughout.")
+    lines += _held_out(done)
     return lines + [line for remark in done.remarks if remark.severity == "note" for line in wrapped(str(remark))]
+
+
+def _held_out(done: "BackAnalysis") -> list[str]:
+    """How well runs held out are predicted, with the model and without it."""
+    if not done.prediction.quantities:
+        return []
+    lines = [f"{'runs held out, mean CRPS':<38}{'runs':>6}{'fitted':>10}{'as it was':>11}{'observed runs alone':>21}"]
+    for one in done.prediction.quantities:
+        title = f"{one.title} [{one.unit}]" if one.unit else one.title
+        scores = f"{one.fitted:>10.3g}{one.default:>11.3g}{one.observed_alone:>21.3g}"
+        lines.append(f"{title:<38}{one.n:>6}{scores}{'' if one.helps else '   better without the model'}")
+    return lines
 
 
 def _draw(arguments: argparse.Namespace, done: "BackAnalysis", folder: Path, progress: PrintedProgress) -> list[str]:

@@ -47,6 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
                 case.releases,
                 case.scenario.settings,
                 sections,
+                completeness=case.completeness,
                 seed=case.scenario.seed,
                 threads=arguments.threads,
                 progress=counted,

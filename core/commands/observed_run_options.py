@@ -34,6 +34,7 @@ from .tree_options import add_tree_options, trees_said
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from ..analysis.completeness import Completeness
     from ..analysis.observed_runs import Observed
     from ..analysis.sections import Section
     from ..reconstruction.choices import FlightEnds
@@ -56,6 +57,12 @@ def add_observed_arguments(parser: argparse.ArgumentParser) -> None:
     add_out(parser)
     parser.add_argument(
         "--stops", metavar="FILE", help="where blocks stopped, without footage: release, x_m, y_m (z_m)"
+    )
+    parser.add_argument(
+        "--completeness",
+        metavar="HOW",
+        help="whether the observed runs are all that fell: complete; longest:N, those that came farthest of N falls "
+        "(longest: of all given releases); or unknown (default: the project's, else not stated)",
     )
     more = parser.add_argument_group("further observed runs, on the same terrain; each can be given again")
     more.add_argument(
@@ -98,6 +105,7 @@ class ObservedCase(NamedTuple):
     observed: "Observed"
     releases: "Releases"
     inputs: dict[str, Path]
+    completeness: "Completeness"
 
 
 def case_as_asked(
@@ -119,8 +127,10 @@ def case_as_asked(
     ------
     InputError : anything that is wrong with the files or the options.
     """
+    from ..analysis.completeness import parse_completeness
     from ..exchange.saved_blend import is_project
 
+    parse_completeness(arguments.completeness or "")  # before anything is read
     return (_of_project if is_project(arguments.table) else _of_table)(arguments, models, number, progress, flights)
 
 
@@ -131,7 +141,8 @@ def _of_project(
     progress: PrintedProgress,
     flights: "FlightEnds | None",
 ) -> ObservedCase:
-    """The measured runs of a project; options replace what its [simulation] says."""
+    """The measured runs of a project; options replace what it says."""
+    from ..analysis.completeness import parse_completeness
     from ..exchange.opening import reconstruct_project
     from ..exchange.project import read_project
     from ..exchange.simulation_entry import TABLE, ReleaseEntry
@@ -167,7 +178,8 @@ def _of_project(
     if flights is not None:
         project = replace(project, reconstruction=replace(project.reconstruction, flights=flights))
     measured = measured_runs(ground, reconstruct_project(project, ground.surface), number)
-    case = ObservedCase(scenario, ground, measured.observed, measured.releases, inputs)
+    stated = project.completeness if arguments.completeness is None else parse_completeness(arguments.completeness)
+    case = ObservedCase(scenario, ground, measured.observed, measured.releases, inputs, stated)
 
     def placed(file: str) -> "ReleaseSource":
         table = replace(entry, releases=ReleaseEntry(TABLE, number=number, file=Path(file)))
@@ -184,6 +196,7 @@ def _of_table(
     flights: "FlightEnds | None",
 ) -> ObservedCase:
     """The runs of a table of picks, or of releases and stops."""
+    from ..analysis.completeness import parse_completeness
     from ..analysis.measured_rebounds import measured_rebounds
     from ..exchange.project import terrain_inputs
     from ..exchange.simulation_tables import read_releases
@@ -230,7 +243,7 @@ def _of_table(
     )
     inputs = {"observed": Path(arguments.table), **terrain_inputs(arguments.terrain), **zone_files, **tree_files}
     drawing = [model.name for model in models if model.draws_from_impacts]
-    ground = ground_of(scenario)
+    ground, stated = ground_of(scenario), parse_completeness(arguments.completeness or "")
     made_of = partial(
         reconstruct,
         surface=surface,
@@ -243,7 +256,7 @@ def _of_table(
         _refuse_drawing(drawing)
         runs = stopped_runs(ground, scenario.releases, arguments.stops)
         inputs["stops"] = Path(arguments.stops)
-        case = ObservedCase(scenario, ground, runs.observed, runs.releases, inputs)
+        case = ObservedCase(scenario, ground, runs.observed, runs.releases, inputs, stated)
         return _with_more(arguments, case, number, made_of, placed, progress)
     made = made_of(read_picks(arguments.table, surface.shift))
     scenario = replace(
@@ -252,7 +265,7 @@ def _of_table(
         measured=measured_rebounds(made.impacts) if drawing else None,
     )
     runs = measured_runs(ground, made, number)
-    case = ObservedCase(scenario, ground, runs.observed, runs.releases, inputs)
+    case = ObservedCase(scenario, ground, runs.observed, runs.releases, inputs, stated)
     return _with_more(arguments, case, number, made_of, placed, progress)
 
 

@@ -247,9 +247,14 @@ def _drawn_tables(sheet: DesignSheet) -> Iterator[Table]:
             tuple(rows),
             "Each block drew a set of its own from all that fit the observed runs, so that the values above have in "
             "them what is not known of the parameters, beside chance. A parameter of which nearly all is left was not "
-            "told by the runs.",
+            "told by the runs." + "".join(f" {_title(one)}: {doubt}" for one in sheet.models for doubt in _doubts(one)),
             words=(4,),
         )
+
+
+def _doubts(model: ModelDesign) -> tuple[str, ...]:
+    """What the back-analysis of its parameters says against itself."""
+    return () if model.settings.draws is None else model.settings.draws.doubts
 
 
 def _score_cells(score: Score) -> tuple[str, ...]:

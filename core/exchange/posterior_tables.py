@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.posterior_checks import doubts_of
 from ..errors import InputError
 from ..impact_models.registry import find_model
 from ..output import write_text
 from ..reading import reader
-from ..remarks import to_plain
+from ..remarks import from_plain, to_plain
 from ..simulation.parameter_draws import ParameterDraws, check_draws
 from ..workflow.back_analysis import BackAnalysis
 from .csv_text import read_table
@@ -42,7 +43,8 @@ def read_posterior(path: str | Path) -> tuple[str, ParameterDraws]:
 
     Notes
     -----
-    What was thought possible before stands in the back_analysis.json beside the table, where that is of the same model.
+    What was thought possible before, and what speaks against it, stand in the back_analysis.json beside the table,
+    where that is of the same model.
     """
     table = read_table(path, (MODEL,), (MODEL, WEIGHT))
     names = [name for name in table.columns if name not in (MODEL, WEIGHT)]
@@ -60,19 +62,21 @@ def read_posterior(path: str | Path) -> tuple[str, ParameterDraws]:
     wrong = np.flatnonzero(~(weight >= 0))
     if wrong.size:
         raise table.error(int(wrong[0]), f"The weight is {weight[wrong[0]]:g}", "Give zero or more")
-    draws = ParameterDraws(tuple(names), values, weight, before=_before(Path(path), model.name, names))
+    before, doubts = _said(Path(path), model.name, names)
+    draws = ParameterDraws(tuple(names), values, weight, before=before, doubts=doubts)
     check_draws(draws, model)
     return model.name, draws
 
 
-def _before(table: Path, model: str, names: Sequence[str]) -> tuple[str, ...]:
-    """What was thought possible of each; none where it is not known."""
+def _said(table: Path, model: str, names: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What was thought possible of each, and what speaks against the back-analysis; none where it is not known."""
     try:
         said = json.loads((table.parent / "back_analysis.json").read_text(encoding="utf-8"))
         found = {one["name"]: f"{one['prior']}: {one['left']}" for one in said["estimates"]}
-        return tuple(found[name] for name in names) if said["model"] == model else ()
+        before = tuple(found[name] for name in names)
+        return (before, doubts_of(from_plain(said["remarks"]))) if said["model"] == model else ((), ())
     except (OSError, ValueError, KeyError, TypeError):  # of a back-analysis of another kind, or of none
-        return ()
+        return (), ()
 
 
 def posteriors_of(files: Sequence[Path], models: Sequence[str]) -> dict[str, ParameterDraws]:
@@ -110,6 +114,10 @@ def back_analysis_content(analysis: BackAnalysis, inputs: dict[str, Path]) -> di
         "gravity_mps2": settings.gravity_mps2,
         "seed": settings.seed,
         "observed_runs": analysis.observed.names.tolist(),
+        "completeness": analysis.completeness.text or "not stated",
+        "falls": analysis.falls,
+        "short_runs": None if analysis.short_runs is None else _plain(asdict(analysis.short_runs)),
+        "if_only_the_longest_were_observed": None if analysis.if_longest is None else asdict(analysis.if_longest),
         "simulated_runs": analysis.runs,
         "seconds": round(analysis.seconds, 1),
         "draws": len(analysis.draws),
@@ -123,7 +131,15 @@ def back_analysis_content(analysis: BackAnalysis, inputs: dict[str, Path]) -> di
             for name, row in zip(names, analysis.correlation.tolist(), strict=True)
         },
         "predictive": [_plain({**asdict(one), "fits": one.fits}) for one in analysis.checks],
-        "held_out": [_plain(asdict(fold)) for fold in analysis.folds],
+        "held_out": [_plain(asdict(fold)) for fold in analysis.prediction.folds],
+        "held_out_quantities": [_plain({**asdict(one), "helps": one.helps}) for one in analysis.prediction.quantities],
+        "better_than_observed_alone": _plain(
+            {
+                "gain": analysis.prediction.gain,
+                "error": analysis.prediction.error,
+                "is_clear": analysis.prediction.is_clear,
+            }
+        ),
         "remarks": to_plain(analysis.remarks),
     }
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..analysis.completeness import NOT_STATED, Completeness, parse_completeness
 from ..constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
 from ..georeference import GlobalShift
@@ -216,6 +217,7 @@ class Project:
 
     Attributes
     ----------
+    completeness : whether the picked trajectories are all that fell; `completeness` of [picks].
     block : what holds for every trajectory that ``blocks`` does not name.
     simulation : None where nothing is said of one.
     """
@@ -223,6 +225,7 @@ class Project:
     site: Site = field(default_factory=Site)
     terrain: TerrainSource | None = None
     picks: Path | None = None
+    completeness: Completeness = NOT_STATED
     block: BlockEntry = field(default_factory=BlockEntry)
     blocks: tuple[BlockEntry, ...] = ()
     reconstruction: ReconstructionSettings = field(default_factory=ReconstructionSettings)
@@ -240,6 +243,14 @@ class Project:
     def block_of(self, trajectory: str) -> BlockEntry:
         """The block of a trajectory, or the project's default block."""
         return next((block for block in self.blocks if block.name == trajectory), self.block)
+
+
+def _completeness(picks: TomlTable) -> Completeness:
+    text = picks.text("completeness", "")
+    try:
+        return parse_completeness(text)
+    except InputError as error:
+        raise picks.wrong("completeness", f"is {text!r}", error.advice or "") from error
 
 
 NO_PROJECT = (".csv", ".tsv", ".txt", ".parquet", ".ply", ".obj", ".las", ".laz", ".mp4", ".mov", ".json")
@@ -270,7 +281,7 @@ def read_project(path: str | Path) -> Project:
     top = TomlTable(read_toml(path, "project"), "", path)
     _check_schema(top)
     site, terrain, picks = top.table("site"), top.table("terrain"), top.table("picks")
-    simulation = top.table("simulation")
+    simulation, completeness = top.table("simulation"), _completeness(picks)
     block = _block(top.table("block"), BlockEntry(), named=False)
     blocks = tuple(_block(table, block, named=True) for table in top.tables("blocks"))
     render = tuple(_preset(table) for table in top.tables("render"))
@@ -284,6 +295,7 @@ def read_project(path: str | Path) -> Project:
         site=Site(site.text("name", ""), site.text("description", ""), site.rest()),
         terrain=None if terrain.absent else _terrain(terrain),
         picks=None if picks.absent else picks.path("file"),
+        completeness=completeness,
         block=block,
         blocks=blocks,
         reconstruction=_reconstruction(top.table("reconstruction")),
@@ -315,8 +327,11 @@ def write_project(project: Project, path: str | Path) -> None:
         files = [relative(file) for file in project.terrain.files]
         stated = {key: value for key, value in _plain(project.terrain).items() if key != "files"}
         content["terrain"] = {"file": files[0] if len(files) == 1 else files} | stated
-    if project.picks is not None or picks_extra:
-        content["picks"] = ({} if project.picks is None else {"file": relative(project.picks)}) | picks_extra
+    own = {} if project.picks is None else {"file": relative(project.picks)}
+    if project.completeness.kind:
+        own["completeness"] = project.completeness.text
+    if own or picks_extra:
+        content["picks"] = own | picks_extra
     content["block"] = {key: value for key, value in _plain(project.block).items() if key != "name"}
     content["blocks"] = [_plain(block) for block in project.blocks]
     content["reconstruction"] = _plain(project.reconstruction)

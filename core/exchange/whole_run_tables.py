@@ -100,6 +100,8 @@ def write_whole_runs(comparison: WholeRuns, path: str | Path) -> None:
         "observed": np.array([_middle(one) for one in rows]),
         "simulated_n": [str(int(one.count[np.isfinite(one.observed)].sum())) for one in rows],
         **{f"simulated_{name}": quantiles[:, i] for i, name in enumerate(QUANTILE_NAMES)},
+        "crps": np.array([one.score for one in rows]),
+        "crps_observed_alone": np.array([one.alone for one in rows]),
         "ranked_n": [str(one.test.n) if one.test else "" for one in rows],
         "a2": np.array([one.test.statistic if one.test else np.nan for one in rows]),
         "p": np.array([one.p for one in rows]),

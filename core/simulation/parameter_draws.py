@@ -26,6 +26,7 @@ class ParameterDraws:
     runs_each : None lets each run draw its set by the weights, as a function of the seed and its number alone. A number
         gives the first so many runs the first set, the next so many the second, and begins again after the last.
     before : for people, of each parameter what was thought possible, and what is left of it; none where not known.
+    doubts : for people, what the back-analysis that they are from says against it.
 
     Raises
     ------
@@ -37,6 +38,7 @@ class ParameterDraws:
     weight: Array
     runs_each: int | None = None
     before: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         sets = len(self.weight)

@@ -11,16 +11,31 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..analysis.completeness import (
+    NOT_STATED,
+    PART,
+    RUN_OUT,
+    Completeness,
+    IfLongest,
+    ShortRuns,
+    check_stops,
+    completeness_remarks,
+    find_short_runs,
+    longest_first,
+    names_that_fell,
+    posterior_if_longest,
+    run_outs,
+)
+from ..analysis.held_out import Prediction, fifths, hold_out
 from ..analysis.likelihood_free import Posterior, SimulatedSets, check_size, places_of_truth, sample_posterior
 from ..analysis.observed_runs import Observed
 from ..analysis.paths import Paths, simulated_paths
 from ..analysis.posterior_checks import (
-    HeldOut,
     PosteriorEstimate,
     PredictiveCheck,
     correlations,
+    doubts_of,
     estimates_of,
-    hold_out,
     posterior_remarks,
     predictive_checks,
 )
@@ -28,6 +43,7 @@ from ..analysis.priors import Prior
 from ..analysis.ranks import FEWEST
 from ..analysis.run_measures import AT_SECTIONS, Limits, errors_of, measure_rebounds, measure_runs
 from ..analysis.run_statistics import (
+    LEAST_ERROR,
     Key,
     ObservedValues,
     Scales,
@@ -45,7 +61,7 @@ from ..simulation.engine import Recorded, Settings, check_settings, simulate
 from ..simulation.ground import Ground
 from ..simulation.parameter_draws import FRICTION_NAME, ParameterDraws
 from ..simulation.release import Releases
-from ..vectors import Array, Indices
+from ..vectors import Array, Indices, Names
 
 SETS, ROUNDS = 2000, 3
 """Sets of parameters in a round, and rounds."""
@@ -69,10 +85,14 @@ class BackAnalysis:
     observed : what was read off the runs.
     draws : the posterior, for `Settings`.
     correlation : (k, k) of the draws.
-    estimates : one for each parameter. checks : one for each quantity. folds : runs that were held out.
+    estimates : one for each parameter. checks : one for each quantity.
+    prediction : of runs that were held out.
     predicted : (S, n, Q) values of data sets simulated with draws of the posterior.
     effective : draws of equal weight that say as much.
     runs : how many were simulated. seconds : how long it took.
+    completeness : what is stated of the observed runs. falls : how many blocks fell with each set of parameters.
+    short_runs : whether the observed runs look as if short ones were missing; None where that cannot be told.
+    if_longest : the parameters if they were the longest part of the falls; None where all is stated or nothing known.
     remarks : what it is worth, the gravest first.
     """
 
@@ -84,11 +104,15 @@ class BackAnalysis:
     correlation: Array
     estimates: tuple[PosteriorEstimate, ...]
     checks: tuple[PredictiveCheck, ...]
-    folds: tuple[HeldOut, ...]
+    prediction: Prediction
     predicted: Array
     effective: float
     runs: int
     seconds: float
+    completeness: Completeness
+    falls: int
+    short_runs: ShortRuns | None
+    if_longest: IfLongest | None
     remarks: tuple[Remark, ...]
 
 
@@ -102,6 +126,8 @@ def back_analyse(
     *,
     sets: int = SETS,
     rounds: int = ROUNDS,
+    completeness: Completeness = NOT_STATED,
+    parts: Sequence[Indices] | None = None,
     threads: int | None = None,
     progress: Progress = silent,
 ) -> BackAnalysis:
@@ -113,10 +139,14 @@ def back_analyse(
     settings : the model, and all that is not fitted; their seed is that of everything here.
     sections : none takes the default ones of the observed runs.
     sets, rounds : sets of parameters in a round.
+    completeness : whether the observed runs are all that fell. Of the longest of a number of falls as many blocks are
+        simulated, and the longest of them compared.
+    parts : runs that are predicted from the others, see `analysis.held_out`; None takes fifths.
 
     Raises
     ------
-    InputError : no run that says anything, a run without a release, settings that cannot be, too few sets.
+    InputError : no run that says anything, a run without a release, settings that cannot be, too few sets, a
+        completeness that cannot be.
     CancelledError : the work was ended.
     """
     started = time.perf_counter()
@@ -131,32 +161,55 @@ def back_analyse(
     if not sections and observed.paths.impact_piece.size:
         sections = default_sections(observed.paths, FEWEST, ground.shift.z)
     values = observe_values(observed, sections, ground)
-    work = _Work(ground, observed, releases, settings, tuple(priors), tuple(sections), values, threads, progress)
+    by_rank = completeness.kind == "longest"
+    fell = names_that_fell(completeness, observed.paths.name, releases.name)
+    check_stops(completeness, values)
+    if by_rank:
+        values = values.take(np.argsort(-run_outs(values), kind="stable"))
+        completeness = replace(completeness, falls=fell.size)
+    work = _Work(
+        ground, observed, releases, settings, tuple(priors), tuple(sections), values, fell, by_rank, threads, progress
+    )
     total = rounds * sets + 2 * CHECKED
     table, found, simulated, scales = _sampled(work, sets, rounds, total)
     progress("Checking the posterior", rounds * sets, total)
     chosen = found.place[_by_weight(found.weight, CHECKED, settings.seed)]
-    predicted, plain = (
-        work.seen(work.simulated(asked, first, total), scales, first)
-        for asked, first in ((_values_at(priors, chosen), len(table)), (None, len(table) + CHECKED))
-    )
+    drawn = work.simulated(_values_at(priors, chosen), len(table), total)
+    predicted = work.seen(drawn, scales, len(table))
+    as_set = len(table) + CHECKED
+    plain = work.seen(work.simulated(None, as_set, total), scales, as_set)
     progress("Predicting runs that are held out", total, total)
     places = places_of_truth(table, found, TRUTHS, settings.seed)
     estimates = estimates_of(priors, found, places)
     checks = predictive_checks(values, predicted, scales)
-    folds = hold_out(values, table, simulated, sets, plain, settings.seed)
-    remarks = posterior_remarks(
-        find_model(settings.model).title, len(values), estimates, checks, folds, found.effective
+    held_out = fifths(len(values), settings.seed) if parts is None else parts
+    prediction = hold_out(values, table, simulated, sets, plain, held_out, by_rank=by_rank)
+    short_runs = None if by_rank else find_short_runs(values, work.seen(drawn, scales, len(table), 0.0))
+    if_longest = (
+        None
+        if completeness.kind in ("complete", "longest")
+        else _if_longest(priors, posterior_if_longest(values, table, simulated, sets))
     )
+    title = find_model(settings.model).title
+    remarks = [*posterior_remarks(title, len(values), estimates, checks, prediction, found.effective)]
+    remarks += completeness_remarks(completeness, short_runs, if_longest, len(values))
     draws = ParameterDraws(
         tuple(prior.name for prior in priors), _values_at(priors, found.place), found.weight,
-        before=tuple(f"{one.prior}: {one.left}" for one in estimates),
+        before=tuple(f"{one.prior}: {one.left}" for one in estimates), doubts=doubts_of(remarks),
     )  # fmt: skip
     return BackAnalysis(
-        settings.model, settings, tuple(priors), values, draws, correlations(priors, found), estimates, checks, folds,
-        predicted, found.effective, total * len(values), time.perf_counter() - started,
-        tuple(gravest_first([*releases.remarks, *remarks])),
+        settings.model, settings, tuple(priors), values, draws, correlations(priors, found), estimates, checks,
+        prediction, predicted, found.effective, total * fell.size, time.perf_counter() - started, completeness,
+        fell.size, short_runs, if_longest, tuple(gravest_first([*releases.remarks, *remarks])),
     )  # fmt: skip
+
+
+def _if_longest(priors: Sequence[Prior], found: Posterior | None) -> IfLongest | None:
+    if found is None:
+        return None
+    at = found.quantiles(np.array([0.025, 0.5, 0.975]))
+    low, median, high = (tuple(float(prior.values(row[j : j + 1])[0]) for j, prior in enumerate(priors)) for row in at)
+    return IfLongest(PART, tuple(prior.name for prior in priors), median, low, high)
 
 
 def observe_values(observed: Observed, sections: Sequence[Section], ground: Ground) -> ObservedValues:
@@ -223,7 +276,13 @@ def _by_weight(weight: Array, number: int, seed: int) -> Indices:
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """Everything that one set of parameters is simulated with."""
+    """Everything that one set of parameters is simulated with.
+
+    Attributes
+    ----------
+    fell : of the release of each block that falls with a set.
+    by_rank : whether the longest of them are compared, in their order; else each with the run of its own release.
+    """
 
     ground: Ground
     observed: Observed
@@ -232,6 +291,8 @@ class _Work:
     priors: tuple[Prior, ...]
     sections: tuple[Section, ...]
     values: ObservedValues
+    fell: Names
+    by_rank: bool
     threads: int | None
     progress: Progress
 
@@ -241,7 +302,7 @@ class _Work:
         They are without the errors of the observed ones.
         """
         number = CHECKED if sets is None else len(sets)
-        at_once = max(1, RUNS_AT_ONCE // len(self.values))
+        at_once = max(1, RUNS_AT_ONCE // self.fell.size)
         parts = [
             self._chunk(None if sets is None else sets[start : start + at_once], first + start, size, total)
             for start in range(0, number, at_once)
@@ -249,12 +310,18 @@ class _Work:
         ]
         return np.concatenate(parts)
 
-    def seen(self, values: Array, scales: Scales, first: int) -> Array:
-        """(S, n, Q) values as they would have been observed, of sets from the number `first` on."""
-        return with_errors(self.values, scales, values, np.random.default_rng([self.settings.seed, 19, first]))
+    def seen(self, values: Array, scales: Scales, first: int, least: float = LEAST_ERROR) -> Array:
+        """(S, n, Q) values as they would have been observed, of sets from the number `first` on; see `with_errors`.
+
+        Those of the longest have their own errors alone: others would change which are the longest, and the scatter of
+        a few ranks, and with it what fits.
+        """
+        if self.by_rank:
+            least = 0.0
+        return with_errors(self.values, scales, values, np.random.default_rng([self.settings.seed, 19, first]), least)
 
     def _chunk(self, sets: Array | None, first: int, size: int, total: int) -> Array:
-        n = len(self.values)
+        n = self.fell.size
         settings = self.settings
         if sets is not None:
             names = tuple(prior.name for prior in self.priors)
@@ -272,18 +339,25 @@ class _Work:
         if len(simulation) < simulation.wanted:
             raise CancelledError
         paths = self.observed.paths
-        limits, axis = _limits(paths).take(np.tile(np.arange(n), size)), axis_of(paths)
+        limits, axis = _limits(paths), axis_of(paths)
+        if self.by_rank:  # each of them was seen to its stop
+            limits = limits.take(np.zeros(n, dtype=np.intp))
+        limits = limits.take(np.tile(np.arange(n), size))
         found = _measured(simulated_paths(simulation), self.sections, axis, self.ground, limits)
-        return columns_of(self.values.keys, found).reshape(size, n, -1)
+        values = columns_of(self.values.keys, found).reshape(size, n, -1)
+        if not self.by_rank:
+            return values
+        return longest_first(values, found[RUN_OUT].reshape(size, n), len(self.values))
 
     def _rows(self, first: int, size: int) -> Indices:
         """(size · n,) releases of the sets from the number `first` on, run by run."""
         columns = []
-        for name in self.observed.paths.name.tolist():
+        for place, name in enumerate(self.fell.tolist()):
             own = np.flatnonzero(self.releases.name == name)
             if not own.size:
                 raise InputError("No block is released for this run", trajectory=name, advice="Give its release")
-            columns.append(own[np.arange(first, first + size) % own.size])
+            again = int((self.fell[:place] == name).sum())
+            columns.append(own[(np.arange(first, first + size) + again) % own.size])
         return np.stack(columns, axis=1).ravel()
 
 

@@ -374,6 +374,7 @@ def _remarks_of_one(simulation: Simulation) -> list[Remark]:
     remarks.append(Remark(text, "note", model))
     if simulation.settings.draws is not None:
         remarks.append(Remark(_drawn_sentence(simulation.settings.draws), "note", model))
+        remarks += [Remark(f"The back-analysis: {one}", "warning", model) for one in simulation.settings.draws.doubts]
     measured = simulation.settings.measured
     if measured is not None and find_model(model).draws_from_impacts:
         remarks.append(Remark(measured_sentence(measured), "note", model))

@@ -9,6 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..analysis.completeness import (
+    NOT_STATED,
+    Completeness,
+    compared_completeness,
+    names_that_fell,
+    unseen_stop,
+)
 from ..analysis.observed_runs import Observed, join_observed, observe_runs
 from ..analysis.paths import Paths, simulated_paths
 from ..analysis.ranks import FEWEST
@@ -24,7 +31,7 @@ from ..simulation.ground import Ground
 from ..simulation.measured_releases import from_reconstruction
 from ..simulation.release import Releases, join_releases, standing_on
 from ..terrain.raycast import closest_points
-from ..vectors import Array, Mask
+from ..vectors import Array, Indices, Mask
 from .simulation import remarks_of, run_models
 
 
@@ -77,6 +84,7 @@ def compare_whole_runs(
     settings: Sequence[Settings],
     sections: Sequence[Section] = (),
     *,
+    completeness: Completeness = NOT_STATED,
     seed: int = 0,
     threads: int | None = None,
     progress: Progress = silent,
@@ -88,26 +96,58 @@ def compare_whole_runs(
     releases : several for each observed run, of its name; see `released_as_observed`.
     settings : one for each model. What is drawn from measured impacts is never drawn from the run's own.
     sections : none takes the default ones of the observed runs.
+    completeness : whether the observed runs are all that fell. Of the longest of a number of falls as many blocks fall
+        in each repeat, and only the longest of them are compared, each with the observed run of its own release.
 
     Raises
     ------
-    InputError : settings that cannot be, observed runs without a release.
+    InputError : settings that cannot be, observed runs without a release, a completeness that cannot be.
     CancelledError : the work was ended before all models were finished.
     """
     for name in observed.paths.name.tolist():
         if name not in releases.name:
             raise InputError("No block is released for this run", trajectory=name, advice="Give its release")
+    repeat = None
+    if completeness.kind == "longest":
+        releases, repeat, completeness = _as_many_as_fell(observed, releases, completeness)
     simulations = _simulations(ground, releases, settings, threads, progress)
     if len(simulations) < len(settings) or any(len(one) < one.wanted for one in simulations):
         raise CancelledError
     progress("Comparing", 0, 0)
     paths = {one.settings.model: simulated_paths(one) for one in simulations}
+    if repeat is not None:
+        paths = {model: _longest(runs, repeat, len(observed.paths)) for model, runs in paths.items()}
     if not sections and observed.paths.impact_piece.size:
         sections = default_sections(observed.paths, FEWEST, ground.shift.z)
     told = [one for one in remarks_of(simulations) if one.severity != "note"]
-    return ComparedSimulations(
-        compare_runs(observed, paths, ground, sections, seed=seed), simulations, (*releases.remarks, *told)
-    )
+    found = compare_runs(observed, paths, ground, sections, seed=seed)
+    stated = compared_completeness(completeness, len(observed.paths))
+    return ComparedSimulations(found, simulations, (*releases.remarks, *told, *stated))
+
+
+def _as_many_as_fell(
+    observed: Observed, releases: Releases, stated: Completeness
+) -> tuple[Releases, Indices, Completeness]:
+    """The releases of all falls, each as often as that of a run is there, and of which repeat each is."""
+    paths = observed.paths
+    for name in paths.name[np.isnan(paths.stop[:, 0])].tolist():
+        raise unseen_stop(name)
+    fell = names_that_fell(stated, paths.name, releases.name)
+    repeats = int((releases.name == paths.name[0]).sum())
+    rows, repeat = [], []
+    for name in dict.fromkeys(fell.tolist()):
+        own, times = np.flatnonzero(releases.name == name), int((fell == name).sum())
+        rows.append(np.resize(own, repeats * times))
+        repeat.append(np.arange(repeats * times) % repeats)
+    return releases.take(np.concatenate(rows)), np.concatenate(repeat), replace(stated, falls=fell.size)
+
+
+def _longest(runs: Paths, repeat: Indices, number: int) -> Paths:
+    """Of each repeat the runs that come farthest."""
+    run_out = np.hypot(*(runs.stop - runs.start[runs.first_piece[:-1]])[:, :2].T)
+    order = np.lexsort((-np.nan_to_num(run_out, nan=-np.inf), repeat))
+    place = np.arange(order.size) - np.searchsorted(repeat[order], repeat[order])
+    return runs.take(np.sort(order[place < number]))
 
 
 def _simulations(

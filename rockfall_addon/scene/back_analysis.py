@@ -10,6 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...core.analysis.calibration import usual_names
+from ...core.analysis.completeness import Completeness, parse_completeness
 from ...core.analysis.priors import Prior, laws_in, make_priors
 from ...core.analysis.sections import Section
 from ...core.errors import RockfallError
@@ -51,6 +52,9 @@ CENTRES = "centres"
 """Observed flights join what simulated ones do."""
 VARIANTS = 64
 """Starts of each observed run, moved by the errors of its picks where these are known."""
+UNSTATED = "UNSTATED"
+"""Nothing is said of whether the observed runs are all that fell."""
+MOST_FALLS = 100_000
 STALE = "Picks, terrain or other settings were changed since: these are parameters of what was before. Analyse again."
 
 
@@ -65,6 +69,7 @@ class Question:
     sections : gives where they are compared, none for the usual ones.
     priors : of the parameters that are fitted.
     sets, rounds : of parameters.
+    completeness : whether the observed runs are all that fell.
     observed : see `posterior.Kept`.
     print : of all that.
     remarks : what of the measured trajectories is missing.
@@ -76,6 +81,7 @@ class Question:
     priors: tuple[Prior, ...]
     sets: int
     rounds: int
+    completeness: Completeness
     observed: tuple[str, ...]
     print: str
     remarks: tuple[Remark, ...]
@@ -144,10 +150,26 @@ def ask(scene: bpy.types.Scene) -> Question:
         priors,
         settings.sets,
         settings.rounds,
+        completeness_of(scene),
         observed,
         known,
         left_out,
     )
+
+
+def completeness_of(scene: bpy.types.Scene) -> Completeness:
+    """Whether the observed runs are all that fell, as the scene states it."""
+    settings = scene.rockfall_back_analysis
+    if settings.completeness == "LONGEST":
+        return Completeness("longest", settings.falls or None)
+    return parse_completeness("" if settings.completeness == UNSTATED else settings.completeness.lower())
+
+
+def keep_completeness(scene: bpy.types.Scene, stated: Completeness) -> None:
+    """State it in the scene."""
+    settings = scene.rockfall_back_analysis
+    settings.completeness = stated.kind.upper() or UNSTATED
+    settings.falls = min(stated.falls or 0, MOST_FALLS)
 
 
 def _observed(
@@ -203,7 +225,7 @@ def run(question: Question, progress: Progress) -> BackAnalysis:
     ground = ground_of(question.scenario)
     return back_analyse(
         ground, *question.runs(ground), question.scenario.settings[0], question.priors, question.sections(ground),
-        sets=question.sets, rounds=question.rounds, progress=progress,
+        sets=question.sets, rounds=question.rounds, completeness=question.completeness, progress=progress,
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ import bpy
 import numpy as np
 
 from ...core.analysis.likelihood_free import weighted_quantiles
+from ...core.analysis.posterior_checks import doubts_of
 from ...core.exchange.posterior_tables import read_posterior, write_posterior
 from ...core.remarks import Remark, from_plain
 from ...core.simulation.parameter_draws import ParameterDraws
@@ -81,8 +82,8 @@ def draws_in(found: Mapping[str, Any]) -> ParameterDraws:
     """The draws of what is kept as text."""
     told = {row[0]: f"{row[5]}: {row[7]}" for row in found["rows"] if len(row) > 7 and row[5]}
     before = tuple(told[name] for name in found["names"]) if set(told) >= set(found["names"]) else ()
-    values = np.array(found["values"], dtype=float)
-    return ParameterDraws(tuple(found["names"]), values, np.array(found["weight"]), before=before)
+    values, doubts = np.array(found["values"], dtype=float), doubts_of(from_plain(found["remarks"], "note"))
+    return ParameterDraws(tuple(found["names"]), values, np.array(found["weight"]), before=before, doubts=doubts)
 
 
 def keep(scene: bpy.types.Scene, model: str, draws: ParameterDraws, **more: object) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import bpy
 
+from ...core.analysis.completeness import NOT_STATED
 from ...core.errors import RockfallError
 from ...core.exchange.opening import open_project, open_terrain
 from ...core.exchange.parameters import checked_parameters
@@ -35,6 +36,7 @@ from ...core.terrain.surface import Surface
 from ...core.terrain.writers import write_ply
 from ...core.workflow.simulation import Zones
 from . import (
+    back_analysis,
     film_preset,
     fit,
     georeference,
@@ -102,6 +104,7 @@ def load_project(scene: bpy.types.Scene, path: Path, *, with_videos: bool = True
     scene[store.RENDER_PRESETS] = json.dumps([asdict(preset) for preset in film_preset.take(scene, project.render)])
     fit.forget(scene)
     posterior.forget(scene)
+    back_analysis.keep_completeness(scene, project.completeness)
     for which, values in parameters.items():
         models.keep_parameters(scene, values, which)
     if surface is not None and shading is not None:
@@ -187,6 +190,7 @@ def save_project(scene: bpy.types.Scene, folder: Path) -> tuple[Path, tuple[Rema
             site=site_of(scene),
             terrain=None if surface is None else source,
             picks=None if table is None else place / "picks.csv",
+            completeness=NOT_STATED if table is None else back_analysis.completeness_of(scene),
             block=settings.block,
             blocks=settings.blocks,
             reconstruction=settings.reconstruction,

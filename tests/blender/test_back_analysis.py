@@ -67,6 +67,31 @@ def test_what_fits_is_kept_with_its_intervals_and_how_good_it_is(part, scene) ->
     assert again["values"] == kept["values"], "the same seed"
 
 
+def test_the_observed_runs_alone_stand_beside_the_verdict(part, scene) -> None:
+    """As on the command line: no verdict without them, and without a statement the record is asked for."""
+    said = {one["about"]: one["text"] for one in analysed(scene)["remarks"]}
+    assert "the other observed runs alone" in said["fit"].lower()
+    assert "It is not stated whether all falls were recorded" in said["completeness"]
+
+
+def test_what_is_stated_of_the_record_goes_into_the_question_and_the_project(part, scene, tmp_path: Path) -> None:
+    analysis = part("rockfall_addon.scene.back_analysis")
+    settings = scene.rockfall_back_analysis
+    assert analysis.ask(scene).completeness.text == ""
+    for chosen, falls, text in (("COMPLETE", 0, "complete"), ("UNKNOWN", 0, "unknown"), ("LONGEST", 0, "longest"),
+                                ("LONGEST", 60, "longest:60")):  # fmt: skip
+        settings.completeness, settings.falls = chosen, falls
+        assert analysis.ask(scene).completeness.text == text
+    with pytest.raises(RuntimeError, match="not seen to its stop"):
+        bpy.ops.rockfall.back_analyse()
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path)) == {"FINISHED"}
+    assert 'completeness = "longest:60"' in (tmp_path / "project.toml").read_text(encoding="utf-8")
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
+    assert bpy.ops.rockfall.open_project(filepath=str(tmp_path / "project.toml")) == {"FINISHED"}
+    settings = bpy.context.scene.rockfall_back_analysis
+    assert (settings.completeness, settings.falls) == ("LONGEST", 60)
+
+
 def test_blocks_draw_from_it_when_they_are_told_to(part, scene) -> None:
     setup, posterior = part("rockfall_addon.scene.simulation_setup"), part("rockfall_addon.scene.posterior")
     kept = analysed(scene)

@@ -111,6 +111,45 @@ def test_stops_alone(site: Path, tmp_path: Path, capsys) -> None:
     assert {one["quantity"] for one in content["predictive"]} == {"runout_m", "energy_line_deg", "stop_aside_m"}
     assert content["friction_set"] is None
     assert not (out / "figures").exists()
+    assert content["completeness"] == "not stated"
+    assert "It is not stated whether all falls were recorded" in said
+    assert "runs held out, mean CRPS" in said
+    run_out = next(one for one in content["held_out_quantities"] if one["quantity"] == "runout_m")
+    values = np.array([np.hypot(float(row["x_m"]) - EAST - 6, 0.0) for row in rows_of(site / "stops.csv")])
+    alone = np.mean(  # six runs in five parts: by hand, where each is left out alone
+        [np.abs(np.delete(values, i) - values[i]).mean() - _half_gini(np.delete(values, i)) for i in range(RUNS)]
+    )
+    assert run_out["observed_alone"] == pytest.approx(alone, rel=0.25)
+    verdict = " ".join(one["text"] for one in content["remarks"] if one["about"] == "fit")
+    assert f"run-out {run_out['observed_alone']:.3g} without it, {run_out['fitted']:.3g} m with" in verdict
+    assert set(content["better_than_observed_alone"]) == {"gain", "error", "is_clear"}
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open(encoding="utf-8", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def _half_gini(values: np.ndarray) -> float:
+    return float(np.abs(values[:, None] - values).mean() / 2)
+
+
+def test_the_longest_of_all_releases(site: Path, tmp_path: Path, capsys) -> None:
+    """Three of the six stops, and the releases of all six."""
+    stops = rows_of(site / "stops.csv")
+    farthest = sorted(stops, key=lambda row: -float(row["x_m"]))[:3]
+    few = tmp_path / "few.csv"
+    few.write_text("release,x_m,y_m\n" + "".join(f"{','.join(row.values())}\n" for row in farthest), encoding="utf-8")
+    more = ["--stops", str(few), "--fit", "friction", "--sets", "150", "--rounds", "1", "--tables-only"]
+    for i, (stated, falls) in enumerate((("longest", 6), ("longest:7", 7))):
+        out = tmp_path / f"out{i}"
+        argv = asked(site, out, *more, "--completeness", stated, observed="releases.csv")
+        assert main(argv) == 0
+        content = json.loads((out / "back_analysis.json").read_text(encoding="utf-8"))
+        assert (content["completeness"], content["falls"]) == (f"longest:{falls}", falls)
+        assert content["observed_runs"] == [row["release"] for row in farthest]
+        assert content["simulated_runs"] == falls * (150 + 1000)
+        assert f"compared with the longest of {falls} that fall" in " ".join(capsys.readouterr().out.split())
 
 
 @pytest.mark.parametrize(
@@ -122,6 +161,9 @@ def test_stops_alone(site: Path, tmp_path: Path, capsys) -> None:
         (["--fit", "rn", "--set", f"{MODEL}.rn=0.4"], "rn is both fitted and set. Leave"),
         (["--fit", "friction", "--friction", "0.4"], "friction is both fitted and set. Leave"),
         (["--fit", "rn", "--sets", "10"], "are too few. Give"),
+        (["--fit", "rn", "--completeness", "all"], "says nothing of whether all falls were recorded. Write complete"),
+        (["--fit", "rn", "--completeness", "longest"], "it is not stated of how many falls. Write longest:N"),
+        (["--fit", "rn", "--completeness", "longest:9"], "not seen to its stop. Give its stop"),
     ],
 )
 def test_bad_input(site: Path, tmp_path: Path, capsys, more: list[str], problem: str) -> None:
@@ -177,6 +219,24 @@ def test_blocks_draw_their_parameters_from_the_posterior(site: Path, analysed: P
     assert main(simulated(site, tmp_path / "set", *fixed)) == 0
     np.testing.assert_array_equal(run_outs(tmp_path / "drawn"), run_outs(tmp_path / "set"))
     assert "drawn_" not in (tmp_path / "set" / "runs.csv").read_text(encoding="utf-8")
+
+
+def test_what_speaks_against_a_posterior_goes_with_it(site: Path, analysed: Path, tmp_path: Path, capsys) -> None:
+    """From back_analysis.json beside the table into what `simulate` says; what speaks for it does not."""
+    content = json.loads((analysed / "back_analysis.json").read_text(encoding="utf-8"))
+    doubt = "The other observed runs alone predict the runs held out better."
+    content["remarks"] = [
+        {"text": doubt, "severity": "warning", "about": "fit"},
+        {"text": "All well.", "severity": "note", "about": "fit"},
+    ]
+    (tmp_path / "back_analysis.json").write_text(json.dumps(content), encoding="utf-8")
+    (tmp_path / "posterior.csv").write_bytes((analysed / "posterior.csv").read_bytes())
+    assert read_posterior(tmp_path / "posterior.csv")[1].doubts == (doubt,)
+    posterior = ["--posterior", str(tmp_path / "posterior.csv"), "--model", MODEL, "--record", "none"]
+    assert main(simulated(site, tmp_path / "out", *posterior)) == 0
+    assert f"The back-analysis: {doubt}" in " ".join(capsys.readouterr().out.split())
+    (tmp_path / "back_analysis.json").unlink()
+    assert read_posterior(tmp_path / "posterior.csv")[1].doubts == ()
 
 
 def test_a_project_names_its_posterior(site: Path, analysed: Path, tmp_path: Path, capsys) -> None:

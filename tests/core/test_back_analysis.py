@@ -5,10 +5,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rockfall.core.analysis.completeness import (
+    ShortRuns,
+    completeness_remarks,
+    find_short_runs,
+    names_that_fell,
+    parse_completeness,
+)
 from rockfall.core.analysis.fitting import Axis
+from rockfall.core.analysis.held_out import Prediction
 from rockfall.core.analysis.observed_runs import Observed, observe_stops
 from rockfall.core.analysis.paths import Paths, simulated_paths
-from rockfall.core.analysis.posterior_checks import FLAT
+from rockfall.core.analysis.posterior_checks import FLAT, PredictiveCheck, posterior_remarks
 from rockfall.core.analysis.priors import Prior, laws_in, make_priors
 from rockfall.core.analysis.run_measures import Limits, measure_rebounds
 from rockfall.core.analysis.run_statistics import (
@@ -85,12 +93,185 @@ def test_known_parameters_are_found_again(analysis: BackAnalysis) -> None:
 
 
 def test_fitted_parameters_predict_runs_that_were_held_out(analysis: BackAnalysis) -> None:
-    assert sorted(name for fold in analysis.folds for name in fold.names) == [f"B{i}" for i in range(BLOCKS)]
-    values = sum(fold.values for fold in analysis.folds)
-    assert sum(fold.fitted * fold.values for fold in analysis.folds) < sum(
-        fold.prior * fold.values for fold in analysis.folds
-    )
-    assert 0.8 < sum(fold.inside for fold in analysis.folds) / values <= 1.0
+    told = analysis.prediction
+    assert sorted(name for fold in told.folds for name in fold.names) == [f"B{i}" for i in range(BLOCKS)]
+    assert told.values == sum(fold.values for fold in told.folds)
+    assert told.score("fitted") < told.score("prior")
+    assert 0.8 < sum(fold.inside for fold in told.folds) / told.values <= 1.0
+
+
+def test_what_the_observed_runs_alone_predict_stands_beside_the_verdict(analysis: BackAnalysis) -> None:
+    """By hand: the CRPS of each run-out by those of the other four fifths."""
+    told = analysis.prediction
+    run_out = next(one for one in told.quantities if one.quantity == "runout_m")
+    values = analysis.observed.value[:, analysis.observed.keys.index(("", "runout_m"))]
+    by_name = dict(zip(analysis.observed.names.tolist(), values.tolist(), strict=True))
+    scores = []
+    for fold in told.folds:
+        others = np.array([value for name, value in by_name.items() if name not in fold.names])
+        for name in fold.names:
+            apart = np.abs(others[:, None] - others).mean()
+            scores.append(np.abs(others - by_name[name]).mean() - apart / 2)
+    assert run_out.observed_alone == pytest.approx(np.mean(scores))
+    assert told.score("observed_alone") == pytest.approx(1.0)
+    verdict = next(str(one) for one in analysis.remarks if one.about == "fit")
+    assert f"run-out {run_out.observed_alone:.3g} without it, {run_out.fitted:.3g} m with" in verdict
+
+
+def test_a_model_that_predicts_worse_than_the_observed_runs_alone_is_told_to(
+    ground: Ground, releases: Releases
+) -> None:
+    """All blocks stop at one place, which no model of chance can know; the runs themselves do."""
+    stops = np.column_stack([np.full(BLOCKS, 92.0), releases.position[:, 1], np.full(BLOCKS, -62.0)])
+    observed = observe_stops(releases.name, releases.position, stops, releases.mass_kg)
+    priors = make_priors(find_model(MODEL), ["friction"], {"friction": "0.2..0.8"})
+    found = back_analyse(ground, observed, releases, Settings(MODEL, TRUTH), priors, sets=200, rounds=1)
+    assert not found.prediction.helps
+    assert found.prediction.is_clear
+    verdict = next(one for one in found.remarks if one.about == "fit")
+    assert verdict.severity == "warning"
+    assert "The other observed runs alone predict the runs held out better than CRSP" in str(verdict)
+
+
+def test_a_verdict_is_never_without_what_the_observed_runs_alone_predict() -> None:
+    nothing = Prediction((), (), np.nan, np.nan, 0)
+    check = PredictiveCheck("run-out", "m", "", "runout_m", 9, 50.0, 40.0, 50.0, 60.0, 1.0, 1.0, 1.0, 0.9, 0.9)
+    for checks in ([check], [replace(check, p_holm=0.01)]):
+        (said,) = (one for one in posterior_remarks("M", 9, [], checks, nothing, 500.0) if one.about == "fit")
+        assert "how well it predicts is not known" in str(said)
+        assert said.severity == "warning"
+
+
+# --- whether the observed runs are all that fell ---------------------------------------------------------------------
+
+FALLS, SEEN = 48, 16
+FRICTION = 0.5
+
+
+@pytest.fixture(scope="module")
+def inventory(ground: Ground) -> tuple[Releases, Paths, np.ndarray]:
+    """Blocks that fell with a known friction, and the longest first."""
+    place = placed_on(
+        ground, np.column_stack([np.full(FALLS, 5.0), 6.0 + 2.6 * np.arange(FALLS)]), np.full(FALLS, 0.4)
+    ) + np.array([0.0, 0.0, 2.0])
+    names = np.array([f"B{i}" for i in range(FALLS)])
+    fell = make_releases(place, name=names, velocity=np.tile([3.0, 0.0, 0.0], (FALLS, 1)))
+    paths = simulated_paths(simulate(ground, fell, Settings("stevens_1998", friction=FRICTION, seed=1003)))
+    assert not paths.beyond.any()
+    run_out = np.hypot(*(paths.stop - paths.start[paths.first_piece[:-1]])[:, :2].T)
+    return fell, paths, np.argsort(-run_out)
+
+
+def friction_of(
+    ground: Ground, inventory: tuple[Releases, Paths, np.ndarray], runs: int, stated: str, releases: Releases
+) -> BackAnalysis:
+    _, paths, longest = inventory
+    rows = longest[:runs]
+    start = paths.start[paths.first_piece[:-1]]
+    observed = observe_stops(paths.name[rows], start[rows], paths.stop[rows], paths.mass_kg[rows])
+    priors = make_priors(find_model("stevens_1998"), ["friction"], {})
+    return back_analyse(
+        ground, observed, releases, Settings("stevens_1998", seed=3), priors,
+        sets=250, rounds=2, completeness=parse_completeness(stated),
+    )  # fmt: skip
+
+
+def test_the_longest_of_a_number_of_falls_give_the_friction_of_all(ground: Ground, inventory) -> None:
+    """As if they were all, the longest third give less friction than there is; stated, they give it."""
+    fell, _, longest = inventory
+    third = fell.take(np.sort(longest[:SEEN]))
+    bare = friction_of(ground, inventory, SEEN, "", third)
+    assert bare.estimates[0].high < FRICTION
+    told = [one for one in bare.remarks if one.about == "completeness"]
+    assert [one.severity in ("advice", "warning") for one in told] == [True]
+    assert "It is not stated whether all falls were recorded" in str(told[0])
+    assert bare.if_longest is not None
+    assert bare.if_longest.median[0] > bare.estimates[0].high
+    assert f"friction {bare.if_longest.median[0]:.3g}" in str(told[0])
+    for stated, releases in ((f"longest:{FALLS}", third), ("longest", fell)):
+        found = friction_of(ground, inventory, SEEN, stated, releases)
+        (one,) = found.estimates
+        assert one.low < FRICTION < one.high
+        assert abs(one.median - FRICTION) < 0.6 * abs(bare.estimates[0].median - FRICTION)
+        assert found.falls == FALLS
+        assert found.runs == FALLS * (2 * 250 + 1000)
+        assert f"longest of {FALLS} that fall" in " ".join(map(str, found.remarks))
+
+
+def test_missing_short_runs_are_seen_where_they_would_be_there() -> None:
+    """A normal law of run-outs, and the longest third of three times as many: a closed-form truncation."""
+    rng = np.random.default_rng(8)
+    simulated = rng.normal(100.0, 10.0, (400, 30, 1))
+
+    def observed(values: np.ndarray) -> ObservedValues:
+        column = values[:, None]
+        seen = np.ones(column.shape, dtype=np.bool_)
+        return ObservedValues(np.array([f"B{i}" for i in range(30)]), (("", "runout_m"),), column, column * 0, seen)
+
+    alarms = []
+    for _ in range(40):
+        every = rng.normal(100.0, 10.0, 30)
+        longest = np.sort(rng.normal(0.0, 10.0, 90))[-30:]
+        alarms.append(
+            [
+                find_short_runs(observed(values), simulated).p < 0.05
+                for values in (every, longest - longest.mean() + 100.0)
+            ]
+        )
+    false, right = np.mean(alarms, axis=0)
+    assert false <= 0.15
+    assert right > 0.9
+    assert find_short_runs(observed(np.full(30, np.nan)), simulated) is None
+
+
+def test_a_record_that_is_stated_to_be_complete_is_held_against_the_runs() -> None:
+    missing = ShortRuns(30, 90.0, 60.0, 0.002, 0.2)
+    (said,) = completeness_remarks(parse_completeness("complete"), missing, None, 30)
+    assert said.severity == "warning"
+    assert "the shortest observed run is 90 m, where that of simulated ones is 60 m (p = 0.004)" in str(said)
+    assert "stated to be complete" in str(said)
+    assert not list(completeness_remarks(parse_completeness("complete"), replace(missing, p_shortest=0.5), None, 30))
+    (said,) = completeness_remarks(parse_completeness("unknown"), None, None, 3)
+    assert "stated to be unknown" in str(said)
+    assert "State the completeness" not in str(said)
+
+
+@pytest.mark.parametrize("text", ["", "complete", "longest", "longest:80", "unknown"])
+def test_a_statement_of_completeness_is_read_as_it_is_written(text: str) -> None:
+    assert parse_completeness(text).text == text
+
+
+@pytest.mark.parametrize(
+    "text", ["all", "longest:", "longest:0", "longest:-3", "longest:many", "complete:5", "Longest"]
+)
+def test_other_statements_are_refused(text: str) -> None:
+    with pytest.raises(InputError, match="says nothing of whether all falls were recorded"):
+        parse_completeness(text)
+
+
+def test_falls_that_cannot_be_are_refused(ground: Ground, releases: Releases) -> None:
+    names = np.array(["A", "B"])
+    more = np.array(["A", "B", "C"])
+    stated = parse_completeness
+    assert names_that_fell(stated("longest:5"), names, names).tolist() == ["A", "B", "A", "B", "A"]
+    assert names_that_fell(stated("longest"), names, more).tolist() == ["A", "B", "C"]
+    assert names_that_fell(stated(""), names, more).tolist() == ["A", "B"]
+    for text, released, problem in (
+        ("longest", names, "it is not stated of how many falls"),
+        ("longest:1", names, "2 observed runs, more than the 1 falls"),
+        ("longest:2", more, "3 blocks that were released, more than the 2 falls"),
+    ):
+        with pytest.raises(InputError, match=problem):
+            names_that_fell(stated(text), names, released)
+    observed = observed_with(ground, releases, Settings(MODEL, TRUTH, seed=5))
+    gone = replace(observed.paths, stop=observed.paths.stop * np.array([[np.nan]] + [[1.0]] * (BLOCKS - 1)))
+    priors = make_priors(find_model(MODEL), ["rn"], {})
+    with pytest.raises(InputError, match="not seen to its stop") as refused:
+        back_analyse(
+            ground, replace(observed, paths=gone), releases, Settings(MODEL), priors,
+            sets=300, completeness=stated("longest:20"),
+        )  # fmt: skip
+    assert refused.value.trajectory == "B0"
 
 
 def test_what_has_no_effect_is_not_told(ground: Ground, releases: Releases) -> None:

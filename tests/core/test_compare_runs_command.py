@@ -133,14 +133,46 @@ def test_stops_alone(site: Path, tmp_path: Path) -> None:
     assert found["runout_m"]["simulated_n"] == "120"
     assert float(found["runout_m"]["p"]) > 0.001
     assert found["v_max_mps"]["observed_n"] == "0"
+    values = np.array([float(row["x_m"]) - EAST - 6 for row in rows_of(site / "stops.csv")])
+    alone = []  # each run by the other five: the definition of the CRPS
+    for i, value in enumerate(values):
+        others = np.delete(values, i)
+        alone.append(np.abs(others - value).mean() - np.abs(others[:, None] - others).mean() / 2)
+    assert float(found["runout_m"]["crps_observed_alone"]) == pytest.approx(np.mean(alone), rel=0.02)
+    simulated = [float(row["x_m"]) for row in rows_of(out / "runs.csv")]
+    assert 0 < float(found["runout_m"]["crps"]) < np.ptp(simulated)
+    assert "than by the other observed runs alone" in found["runout_m"]["verdict"]
     flat = [np.hypot(float(row["x_m"]) - EAST - 6, 0.0) for row in rows_of(site / "stops.csv")]
     assert float(found["runout_m"]["observed"]) == pytest.approx(np.median(flat), rel=0.05)
+
+
+def test_the_longest_are_compared_with_the_longest(site: Path, tmp_path: Path, capsys) -> None:
+    """Three of six stops: as if they were all, blocks stop too soon; of six, the same number falls and three count."""
+    few = tmp_path / "few.csv"
+    farthest = sorted(rows_of(site / "stops.csv"), key=lambda row: -float(row["x_m"]))[:3]
+    few.write_text("release,x_m,y_m\n" + "".join(f"{','.join(row.values())}\n" for row in farthest), encoding="utf-8")
+    more = ["--stops", str(few), "--number", "40", "--model", "noel_2017", "--tables-only"]
+    medians = []
+    for i, stated in enumerate(("complete", "longest", "longest:12")):
+        out = tmp_path / f"out{i}"
+        assert main(asked(site, out, *more, "--completeness", stated, observed="releases.csv")) == 0
+        found = {row["quantity"]: row for row in rows_of(out / "whole_runs.csv")}
+        medians.append(float(found["runout_m"]["simulated_q50"]))
+        said = capsys.readouterr().out
+        assert ("compared with the longest of" in said) == (stated != "complete")
+        assert "It is not stated" not in said
+        falls = 12 if stated.endswith("12") else 6
+        assert len(rows_of(out / "runs.csv")) == 40 * falls
+        assert int(found["runout_m"]["simulated_n"]) == 120 if stated == "complete" else 20 < 120
+    assert medians[0] < medians[1] < medians[2]
+    assert main(asked(site, tmp_path / "bare", *more, observed="releases.csv")) == 0
+    assert "It is not stated whether all falls were recorded" in capsys.readouterr().out
 
 
 def test_a_project_says_it_all(site: Path, tmp_path: Path) -> None:
     project = site / "project.toml"
     project.write_text(
-        'schema = 1\n[terrain]\nfile = "slope.ply"\n[picks]\nfile = "picks.csv"\n'
+        'schema = 1\n[terrain]\nfile = "slope.ply"\n[picks]\nfile = "picks.csv"\ncompleteness = "complete"\n'
         "[block]\nd1_m = 0.5\nd2_m = 0.5\nd3_m = 0.5\n[models.pfeiffer_bowen_1989]\nrn = 0.3\n",
         encoding="utf-8",
     )
@@ -149,6 +181,9 @@ def test_a_project_says_it_all(site: Path, tmp_path: Path) -> None:
     assert main([*argv, "--out", str(out)]) == 0
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert summary["models"]["pfeiffer_bowen_1989"]["parameters"] == {"rn": 0.3}
+    assert "not stated" not in json.dumps(summary)
+    assert main([*argv, "--completeness", "unknown", "--out", str(tmp_path / "other")]) == 0
+    assert "stated to be unknown" in (tmp_path / "other" / "summary.json").read_text(encoding="utf-8")
     assert {row["verdict"] for row in rows_of(out / "whole_runs.csv") if row["quantity"] == "v_max_mps"} == {
         "too few with enough simulated to tell (0, not 5)"
     }

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rockfall.core.analysis.completeness import parse_completeness
 from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.exchange.opening import open_project, open_terrain
 from rockfall.core.exchange.project import (
@@ -408,3 +409,21 @@ def test_a_table_in_the_place_of_a_project_is_named(tmp_path):
     (tmp_path / "picks.csv").write_text("trajectory,time_s\n")
     with pytest.raises(InputError, match=r"This is a \.csv file, and a project is needed"):
         read_project(tmp_path / "picks.csv")
+
+
+@pytest.mark.parametrize("text", ["complete", "longest:80", "longest", "unknown"])
+def test_the_completeness_of_the_record_is_kept(tmp_path: Path, text: str) -> None:
+    (tmp_path / "picks.csv").write_text("trajectory\n", encoding="utf-8")
+    stated = Project(picks=tmp_path / "picks.csv", completeness=parse_completeness(text))
+    write_project(stated, tmp_path / "project.toml")
+    assert f'completeness = "{text}"' in (tmp_path / "project.toml").read_text(encoding="utf-8")
+    assert read_project(tmp_path / "project.toml").completeness == stated.completeness
+
+
+def test_a_completeness_that_is_none_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "picks.csv").write_text("trajectory\n", encoding="utf-8")
+    (tmp_path / "project.toml").write_text(
+        'schema = 1\n[picks]\nfile = "picks.csv"\ncompleteness = "all"\n', encoding="utf-8"
+    )
+    with pytest.raises(InputError, match=r"picks.*completeness is 'all'.*Write complete, longest:N"):
+        read_project(tmp_path / "project.toml")

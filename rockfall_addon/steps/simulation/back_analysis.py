@@ -45,6 +45,21 @@ class BackAnalysisSettings(bpy.types.PropertyGroup):
         name="Stops", description="Where each block stopped: release, x_m, y_m; z_m where it is not on the terrain",
         subtype="FILE_PATH",
     )  # fmt: skip
+    completeness: EnumProperty(
+        name="Record", description="Whether the observed runs are all that fell. Parameters that are fitted to the "
+        "longest runs as if they were all make every block come as far",
+        items=[
+            (back_analysis.UNSTATED, "Not stated", "It is looked for signs of missing short runs"),
+            ("COMPLETE", "Complete", "All blocks that fell were observed"),
+            ("LONGEST", "Longest of", "The observed runs came farthest of a number of falls; as many are simulated, "
+             "and the longest of them compared"),
+            ("UNKNOWN", "Unknown", "Nobody knows; it is looked for signs of missing short runs"),
+        ],
+    )  # fmt: skip
+    falls: IntProperty(
+        name="Falls", description="So many blocks fell, of which those that came farthest were observed. 0: as many "
+        "as the table of releases has", default=0, min=0, soft_max=1000, max=back_analysis.MOST_FALLS,
+    )  # fmt: skip
     contours: StringProperty(
         name="Contours [m]", description="Heights in survey coordinates, between commas: speed, height and place are "
         "compared where blocks fall below them. Without any section, three are chosen",
@@ -193,6 +208,9 @@ def _draw_observed(layout: bpy.types.UILayout, settings: BackAnalysisSettings) -
     if "STOPS" in settings.source:
         column.prop(settings, "releases")
         column.prop(settings, "stops")
+    column.prop(settings, "completeness")
+    if settings.completeness == "LONGEST":
+        column.prop(settings, "falls")
 
 
 def _draw_sections(layout: bpy.types.UILayout, scene: bpy.types.Scene, settings: BackAnalysisSettings) -> None:

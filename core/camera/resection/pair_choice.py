@@ -8,12 +8,12 @@ together with the stated one).
 import numpy as np
 
 from ...errors import RockfallError
-from ...least_squares import inverse
 from ...vectors import Array, Mask, norm
 from ..model import Camera
-from .adjustment import Solution, adjusted, adjusted_from, is_settled, scatter_of, squares
+from .adjustment import Solution, adjusted, adjusted_from, is_settled, squares, without_each
 from .problem import Problem
 from .starting import Starts, mirrored
+from .uncertainty import scatter_of
 
 ADJUSTED = 3
 """From how many of the starts the least squares begin."""
@@ -173,22 +173,14 @@ def _suspicion(problem: Problem, solution: Solution, used: Mask) -> Array:
     """
     from scipy.special import fdtri
 
-    spread = inverse(solution.normal)
-    around = solution.slopes @ spread @ np.swapaxes(solution.slopes, 1, 2)
-    expected = solution.noise + np.where(used, -1.0, 1.0)[:, None, None] * around
-    suspicion = np.where(used, 0.0, np.inf)
-    total = float(squares(solution)[used].sum())
-    freedom = 2 * int(used.sum()) - problem.unknowns + PRIOR_FREEDOM
-    for i in range(len(used)):
-        shares = np.linalg.eigvalsh(expected[i] / solution.noise[i, 0, 0]) if np.isfinite(expected[i]).all() else [0.0]
-        if shares[0] < 1e-6:
-            continue  # nothing checks this pair, or it has no pixel
-        squared = float(solution.residual[i] @ np.linalg.solve(expected[i], solution.residual[i]))
-        rest = max(total - squared, 0.0) if used[i] else total
-        others = freedom - 2 if used[i] else freedom
-        limit = 2 * fdtri(2, others, 1 - FALSE_ALARM / len(used))
-        suspicion[i] = squared / max(1.0, (PRIOR_FREEDOM + rest) / others) / limit
-    return suspicion
+    squared = without_each(solution).squared
+    own = squares(solution)
+    total = float(own[used].sum())
+    others = 2 * int(used.sum()) - problem.unknowns + PRIOR_FREEDOM - 2.0 * used
+    rest = np.maximum(total - np.where(used, np.maximum(squared, own), 0.0), 0.0)
+    limit = 2 * fdtri(2, others, 1 - FALSE_ALARM / len(used))
+    suspicion = squared / np.maximum(1.0, (PRIOR_FREEDOM + rest) / others) / limit
+    return np.where(np.isnan(suspicion), np.where(used, 0.0, np.inf), suspicion)
 
 
 def _may_lose_one(problem: Problem, used: Mask) -> bool:

@@ -16,11 +16,12 @@ from ...least_squares import inverse
 from ...remarks import Remark
 from ...vectors import Array, Mask, distance_to_ray, norm
 from ..model import SIGMA_PX, Camera, rays
-from .adjustment import Solution, moved_with, sigma_without, spread_of
+from .adjustment import Solution, moved_with, sigma_without, without_each
 from .advice import Geometry, remarks_on
 from .pair_choice import choose, choose_near
 from .problem import Problem, basis_of, check_number, checked_pairs, free_columns, starting_camera
 from .starting import find_starts
+from .uncertainty import confidence
 
 POSE = ("rx", "ry", "rz", "x", "y", "z")
 """The pose's parameters: turns about the camera's own axes [rad], and the position [m]."""
@@ -57,6 +58,8 @@ class Resection:
     redundancy: int
     remarks: tuple[Remark, ...]
     wrong: tuple[str, ...]
+    by_lens: Array
+    doubt: Array
 
     @property
     def sigma(self) -> dict[str, float]:
@@ -77,8 +80,8 @@ class Resection:
 
         With `pose_covariance` it could back away as if the focal length grew along.
         """
-        pose, lens = self.covariance[:6, :6], self.covariance[6:, 6:]
-        both = self.covariance[:6, 6:]
+        covariance = self.covariance - self.by_lens
+        pose, lens, both = covariance[:6, :6], covariance[6:, 6:], covariance[:6, 6:]
         if not lens.size or np.isinf(pose).any():
             return pose
         return pose - both @ inverse(lens, partly=True) @ both.T
@@ -144,20 +147,20 @@ def resect(
         (solution, used), other = near, None
     else:
         solution, other, used = _searched(start, problem, columns, robust, with_pose=camera is not None)
-    scatter, covariance = spread_of(solution, problem, used)
+    known = confidence(solution, problem, used, other, robust=robust)
     residual_m = distance_to_ray(problem.points, *rays(solution.camera, problem.pixels))
     depth = (problem.points - solution.camera.position) @ solution.camera.rotation[2]
     rmse = float(np.sqrt(np.mean(np.einsum("ni,ni->n", solution.residual, solution.residual)[used])))
     redundancy = 2 * int(used.sum()) - problem.unknowns
-    alone = sigma_without(solution, problem, used) * max(1.0, scatter if np.isfinite(scatter) else 1.0)
+    alone = sigma_without(without_each(solution), used) * known.factor
     geometry = Geometry(
         camera=solution.camera,
         pixels=problem.pixels[used],
         points=problem.points[used],
         depth=depth[used],
         parameters=(*POSE, *columns),
-        covariance=covariance,
-        scatter=scatter,
+        covariance=known.covariance,
+        scatter=known.scatter,
         redundancy=redundancy,
         rmse_px=rmse,
         other=other.camera if other is not None else None,
@@ -174,11 +177,13 @@ def resect(
         used=used,
         rmse_px=rmse,
         parameters=(*POSE, *columns),
-        covariance=covariance,
-        scatter=scatter,
+        covariance=known.covariance,
+        scatter=known.scatter,
         redundancy=redundancy,
         remarks=remarks_on(geometry),
         wrong=tuple(name for name, *_ in geometry.wrong),
+        by_lens=known.by_lens,
+        doubt=known.doubt,
     )
 
 

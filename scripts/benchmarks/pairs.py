@@ -111,7 +111,9 @@ def away(found: Resection, case: Case) -> tuple[Array, float]:
 
 def intervals(cases: int, first: int = 0, **how: object) -> None:
     """Whether the intervals of the position hold."""
-    print(f"{'pairs':>6} {'wrong':>6} {'f':>6} {'components':>11} {'position':>9} {'in doubt':>9} {'σ m':>7} {'error m':>8}")
+    print(
+        f"{'pairs':>6} {'wrong':>6} {'f':>6} {'components':>11} {'position':>9} {'in doubt':>9} {'σ m':>7} {'error m':>8}"
+    )
     for n in (4, 5, 6, 8, 12, 28):
         for wrong in (0, 1):
             for known in (True, False):
@@ -156,7 +158,7 @@ def verdicts(cases: int, first: int = 0, **how: object) -> None:
                         missed += wrong
                         continue
                     bad = np.isin(np.arange(n), case.wrong)
-                    doubted = {int(name) - 1 for name in getattr(found, "doubtful", ())}
+                    doubted = {int(name) - 1 for name in found.asked}
                     is_doubted = np.isin(np.arange(n), list(doubted))
                     lost += bool((~found.used & ~bad).any())
                     found_wrong += int((~found.used & bad).sum())

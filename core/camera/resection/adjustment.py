@@ -20,7 +20,7 @@ class Solution:
     """A camera, the residuals of all pairs, (n, 2) [px], their derivatives (n, 2, p) and covariances (n, 2, 2).
 
     `weight` (n,) is Huber's of each pair, 0 of those that are not used; `normal` and `right` are the normal equations
-    with these weights, `cost` is Huber's, `misfit` that plus what makes solutions with different covariances comparable.
+    with these weights, `cost` is Huber's, `misfit` that plus what makes solutions with other covariances comparable.
     """
 
     camera: Camera
@@ -172,7 +172,7 @@ class Deletion:
     @property
     def squared(self) -> Array:
         """(n,) squared residuals in units of their covariance; NaN where nothing checks the pair."""
-        good = np.isfinite(self.residual).all(axis=1) & np.isfinite(self.expected).all(axis=(1, 2))
+        good = _all_finite(self.residual) & _all_finite(self.expected)
         found = np.full(len(good), np.nan)
         if good.any():
             solved = np.linalg.solve(self.expected[good], self.residual[good][:, :, None])[..., 0]
@@ -183,7 +183,7 @@ class Deletion:
 def without_each(solution: Solution) -> Deletion:
     """Each pair against the others."""
     slopes, noise = solution.slopes, solution.noise
-    seen = np.isfinite(slopes).all(axis=(1, 2)) & np.isfinite(solution.residual).all(axis=1)
+    seen = _all_finite(slopes) & _all_finite(solution.residual)
     known = np.where(seen[:, None, None], slopes, 0.0)
     gap = np.where(seen[:, None], solution.residual, np.nan)
     pull = np.swapaxes(known, 1, 2) @ np.linalg.inv(noise) * solution.weight[:, None, None]
@@ -205,11 +205,16 @@ def sigma_without(deletion: Deletion, used: Mask) -> Array:
     Infinite where nothing but the pair determines it; as the errors are stated.
     """
     place = deletion.spread[:, 3:6, 3:6]
-    known = np.isfinite(place).all(axis=(1, 2))
+    known = _all_finite(place)
     sigma = np.where(used, np.inf, 0.0)
     values = np.linalg.eigvalsh(place[known])[:, -1]
     sigma[known] = np.where(used[known], np.sqrt(np.maximum(values, 0.0)), 0.0)
     return sigma
+
+
+def _all_finite(values: Array) -> Mask:
+    """(n,) which of n arrays have finite numbers only."""
+    return np.asarray(np.isfinite(values).reshape(len(values), -1).all(axis=1), dtype=np.bool_)
 
 
 def moved_with(solution: Solution, problem: Problem, used: Mask, pair: int) -> float:

@@ -149,7 +149,7 @@ def assumed_of_lens(camera: Camera, problem: Problem) -> tuple[tuple[str, ...], 
 
     A centre in the very middle of the image and a distortion of nothing at all are nobody's measurement.
     """
-    free = problem.basis.any(axis=1)
+    free: Mask = np.asarray(problem.basis.any(axis=1), dtype=np.bool_)
     assumed: dict[str, float] = {}
     for name, middle in (("cx", camera.width / 2), ("cy", camera.height / 2)):
         if not free[INTRINSICS.index(name)] and getattr(camera, name) == middle:

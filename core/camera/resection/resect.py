@@ -16,12 +16,13 @@ from ...least_squares import inverse
 from ...remarks import Remark
 from ...vectors import Array, Mask, distance_to_ray, norm
 from ..model import SIGMA_PX, Camera, rays
+from ..quality import CameraQuality
 from .adjustment import Solution, moved_with, sigma_without, without_each
 from .advice import Geometry, remarks_on
 from .pair_choice import choose, choose_near
 from .problem import Problem, basis_of, check_number, checked_pairs, free_columns, starting_camera
 from .starting import find_starts
-from .uncertainty import confidence
+from .uncertainty import confidence, worst_sigma
 
 POSE = ("rx", "ry", "rz", "x", "y", "z")
 """The pose's parameters: turns about the camera's own axes [rad], and the position [m]."""
@@ -39,12 +40,15 @@ class Resection:
     used : (n,) False for pairs that were left out as wrong.
     rmse_px : root of the mean squared length of the residuals of the used pairs [px].
     parameters : (p,) names in the order of the covariance: `POSE`, then what was free of the lens.
-    covariance : (p, p) [rad, m, px, 1]; infinite when the pairs do not determine the parameters.
-    scatter : residuals in units of the stated errors, 1 when they agree; NaN without redundancy. Above 1 the
-        covariance is enlarged by its square.
+    covariance : (p, p) [rad, m, px, 1], with what few pairs cannot show (`uncertainty`): 1.96 standard deviations
+        hold 95 %; infinite when the pairs do not determine the parameters.
+    scatter : residuals in units of the stated errors, 1 when they agree; NaN without redundancy.
     redundancy : observations more than unknowns.
     remarks : what a user should know, the gravest first.
     wrong : names of the pairs left out, or their numbers from 1.
+    asked : names of pairs that are used, and that a person should look at again: the camera hangs on them.
+    by_lens : (p, p) part of the covariance that comes from what was assumed of the lens.
+    doubt : (n,) probability that a pair is wrong, of what the others say.
     """
 
     camera: Camera
@@ -58,6 +62,7 @@ class Resection:
     redundancy: int
     remarks: tuple[Remark, ...]
     wrong: tuple[str, ...]
+    asked: tuple[str, ...]
     by_lens: Array
     doubt: Array
 
@@ -85,6 +90,12 @@ class Resection:
         if not lens.size or np.isinf(pose).any():
             return pose
         return pose - both @ inverse(lens, partly=True) @ both.T
+
+    @property
+    def quality(self) -> CameraQuality:
+        """What the camera rests on."""
+        worst = worst_sigma(self.covariance[3:6, 3:6])
+        return CameraQuality(int(self.used.sum()), self.redundancy, self.wrong, self.asked, worst)
 
     def correlation(self, first: str, second: str) -> float:
         """Correlation of two parameters, −1…1; NaN when they are not determined."""
@@ -152,7 +163,8 @@ def resect(
     depth = (problem.points - solution.camera.position) @ solution.camera.rotation[2]
     rmse = float(np.sqrt(np.mean(np.einsum("ni,ni->n", solution.residual, solution.residual)[used])))
     redundancy = 2 * int(used.sum()) - problem.unknowns
-    alone = sigma_without(without_each(solution), used) * known.factor
+    deletion = without_each(solution)
+    alone = sigma_without(deletion, used) * known.factor
     geometry = Geometry(
         camera=solution.camera,
         pixels=problem.pixels[used],
@@ -168,7 +180,11 @@ def resect(
             (named[i], float(norm(solution.residual[i])), moved_with(solution, problem, used, i))
             for i in np.flatnonzero(~used).tolist()
         ),
-        relied_on=(named[int(np.argmax(alone))], float(alone.max())),
+        asked=tuple(
+            (named[i], float(norm(solution.residual[i])), float(norm(deletion.residual[i])), float(known.moved_m[i]))
+            for i in np.flatnonzero(known.asked).tolist()
+        ),
+        relied_on=(named[int(np.argmax(alone))], float(alone.max()), worst_sigma(known.own[3:6, 3:6])),
     )
     return Resection(
         camera=solution.camera,
@@ -182,6 +198,7 @@ def resect(
         redundancy=redundancy,
         remarks=remarks_on(geometry),
         wrong=tuple(name for name, *_ in geometry.wrong),
+        asked=tuple(name for name, *_ in geometry.asked),
         by_lens=known.by_lens,
         doubt=known.doubt,
     )

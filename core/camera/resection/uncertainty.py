@@ -6,25 +6,33 @@ and that the right pairs were left out. With many pairs the residuals would show
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...least_squares import inverse
-from ...vectors import Array, Mask
-from ..model import INTRINSICS, Camera, project_with_derivatives, vector_from_rotation
+from ...vectors import Array, Mask, norm
+from ..model import Camera, vector_from_rotation
 from .adjustment import Deletion, Solution, adjusted, squares, without_each
-from .problem import Problem, assumed_of_lens
+from .assumed_lens import assumed_lens
+from .problem import Problem
 
 CLICKS_FREEDOM = 4.0
 """How many observations the stated errors are worth: what people state for clicks is often wrong by half."""
 
 PRIOR_WRONG = 0.05
 """Part of all pairs that are wrong before they were seen."""
-WRONG_WITHIN = 0.05
+WRONG_WITHIN = 0.03
 """So far off a wrong pixel may be, in diagonals of the image."""
 NEGLIGIBLE = 1e-4
 """Choices less probable than this are not looked at."""
+DOUBTFUL = 0.02
+"""A pair that is wrong with this probability is worth a look."""
+HANGS = 1.5
+CHANCE = 0.02
+"""So is one whose residual is of less than this chance, and without which the position moves by so many of its own
+standard deviations."""
+
 FEW_PAIRS = 12
 """Up to so many pairs the choice between two of them is looked at, too: of more, one is told from another."""
 CHOICE_STEPS = 15
@@ -40,23 +48,27 @@ class Confidence:
     scatter : residuals in units of the stated errors, 1 when they agree; NaN without redundancy.
     factor : by which standard deviations are larger than from the stated errors, for the scatter that was seen and
         for the scatter that so few residuals cannot show; of the position, 1.96 of them then hold 95 %.
+    own : (p, p) what comes from the clicks alone.
     covariance : (p, p) all together; infinite where the pairs determine nothing.
     by_lens : (p, p) the part of it that comes from what was assumed of the lens.
     by_choice : (p, p) the part that comes from which pairs were believed.
     doubt : (n,) probability that a pair is wrong.
+    asked : (n,) pairs that are used, and that a person should look at again.
+    moved_m : (n,) by how much the position moves without each used pair [m], linearised.
     """
 
     scatter: float
     factor: float
+    own: Array
     covariance: Array
     by_lens: Array
     by_choice: Array
     doubt: Array
+    asked: Mask
+    moved_m: Array
 
 
-def confidence(
-    solution: Solution, problem: Problem, used: Mask, rival: Solution | None, *, robust: bool
-) -> Confidence:
+def confidence(solution: Solution, problem: Problem, used: Mask, rival: Solution | None, *, robust: bool) -> Confidence:
     """What is known of a camera that was found with some of the pairs.
 
     Parameters
@@ -64,20 +76,41 @@ def confidence(
     rival : a different camera that fits nearly as well.
     robust : pairs may be left out, so that it is a choice which.
     """
-    factor = scale_factor(solution, problem, used)
+    factor, deletion = scale_factor(solution, problem, used), without_each(solution)
     own = inverse(solution.normal) * factor**2
-    by_lens = _by_assumed_lens(solution, problem, used, factor)
+    by_lens = assumed_lens(solution, problem, used, factor**2).covariance
     by_choice, doubt = np.zeros_like(own), np.where(used, 0.0, 1.0)
     if np.isfinite(own).all():
-        by_choice, doubt = _by_choice(solution, problem, used, rival, own, robust)
+        by_choice, doubt = _by_choice(solution, problem, used, rival, own, deletion, robust)
     return Confidence(
         scatter=scatter_of(solution, problem, used),
         factor=factor,
+        own=own,
         covariance=own + by_lens + by_choice,
         by_lens=by_lens,
         by_choice=by_choice,
         doubt=doubt,
+        asked=used & ((doubt > DOUBTFUL) | _hanging(solution, problem, used, deletion, own + by_lens)),
+        moved_m=norm(deletion.moved[:, 3:6]),
     )
+
+
+def _hanging(solution: Solution, problem: Problem, used: Mask, deletion: Deletion, covariance: Array) -> Mask:
+    """(n,) pairs that the others hardly believe, and without which the camera would stand elsewhere."""
+    from scipy.special import fdtrc
+
+    place = covariance[3:6, 3:6]
+    deletion = replace(deletion, expected=deletion.expected + assumed_lens(solution, problem, used).noise)
+    redundancy = 2 * int(used.sum()) - problem.unknowns
+    if redundancy <= 2 or not np.isfinite(place).all():
+        return np.zeros(len(used), dtype=np.bool_)
+    moved, squared = np.nan_to_num(deletion.moved[:, 3:6]), np.nan_to_num(deletion.squared)
+    own = float(squares(solution)[used].sum())
+    freedom = CLICKS_FREEDOM + redundancy - 2
+    variance = np.maximum(1.0, (CLICKS_FREEDOM + np.maximum(own - squared, 0.0)) / freedom)
+    sigmas = np.sqrt(np.einsum("ni,ij,nj->n", moved, np.linalg.inv(place), moved))
+    unlikely = fdtrc(2, freedom, squared / variance / 2) < CHANCE
+    return np.asarray(used & unlikely & (sigmas > HANGS))
 
 
 def scale_factor(solution: Solution, problem: Problem, used: Mask) -> float:
@@ -101,49 +134,36 @@ def scale_factor(solution: Solution, problem: Problem, used: Mask) -> float:
     return float(np.sqrt(variance * 3 * fdtri(3, freedom, 0.95) / chdtri(3, 0.05)))
 
 
+def worst_sigma(covariance: Array) -> float:
+    """Of a vector in the direction in which it is known worst; infinite where it is not known."""
+    if not np.isfinite(covariance).all():
+        return float("inf")
+    return float(np.sqrt(max(np.linalg.eigvalsh(covariance)[-1], 0.0)))
+
+
 def scatter_of(solution: Solution, problem: Problem, used: Mask) -> float:
     """Residuals of the used pairs in units of the stated errors; NaN without redundancy."""
     redundancy = 2 * int(used.sum()) - problem.unknowns
     return float(np.sqrt(squares(solution)[used].sum() / redundancy)) if redundancy > 0 else float("nan")
 
 
-def _by_assumed_lens(solution: Solution, problem: Problem, used: Mask, factor: float) -> Array:
-    """(p, p) what the parameters are off because the lens is not as assumed, as far as the pairs leave it open.
-
-    The assumed parameters are taken up with their prior (consider parameters): pairs that would show them off leave
-    little of it.
-    """
-    columns, prior = assumed_of_lens(solution.camera, problem)
-    nothing = np.zeros_like(solution.normal)
-    if not columns:
-        return nothing
-    slope = np.zeros((len(used), 2, len(columns)))
-    seen = project_with_derivatives(solution.camera, problem.points[used]).d_intrinsics
-    slope[used] = seen[:, :, [INTRINSICS.index(name) for name in columns]]
-    trust = np.linalg.inv(solution.noise) * solution.weight[:, None, None]
-    known = np.where(used[:, None, None], solution.slopes, 0.0)
-    mixed = np.einsum("nip,nij,njq->pq", known, trust, slope)
-    own = np.einsum("nip,nij,njq->pq", slope, trust, slope)
-    spread = inverse(solution.normal)
-    if not np.isfinite(spread).all():
-        return nothing
-    effect = spread @ mixed
-    left = inverse((own - mixed.T @ effect) / factor**2 + np.diag(prior**-2.0))
-    return np.asarray(effect @ left @ effect.T)
-
-
 def _by_choice(
-    solution: Solution, problem: Problem, used: Mask, rival: Solution | None, own: Array, robust: bool
+    solution: Solution,
+    problem: Problem,
+    used: Mask,
+    rival: Solution | None,
+    own: Array,
+    deletion: Deletion,
+    robust: bool,
 ) -> tuple[Array, Array]:
-    """(p, p) what other choices of pairs would move and widen, each with its probability; and (n,) that a pair is wrong.
+    """(p, p) what other choices of pairs move and widen, each with its probability; and (n,) that a pair is wrong.
 
     The choices are those that differ from the one that was made in one pair, or in two where there are few pairs. The
     probability of each is that of its residuals, of unknown scatter, when a wrong pixel may be anywhere around.
     """
-    deletion = without_each(solution)
     chosen = [(used, _evidence(solution, problem, used), solution)]
     if robust:
-        for others in _other_choices(problem, solution, deletion, used, chosen[0][1]):
+        for others in _other_choices(problem, solution, deletion, used):
             found = adjusted(solution.camera, problem, others, steps=CHOICE_STEPS)
             if found is not None and np.isfinite(inverse(found.normal)).all():
                 chosen.append((others, _evidence(found, problem, others), found))
@@ -167,13 +187,13 @@ def _by_choice(
     return total, doubt
 
 
-def _other_choices(
-    problem: Problem, solution: Solution, deletion: Deletion, used: Mask, evidence: float
-) -> Iterator[Mask]:
+def _other_choices(problem: Problem, solution: Solution, deletion: Deletion, used: Mask) -> Iterator[Mask]:
     """Other sets of pairs that may be the right ones, the likeliest first, as far as one solution tells."""
     squared, own = deletion.squared, float(squares(solution)[used].sum())
     n, p, m = len(used), problem.unknowns, int(used.sum())
     area = _areas(solution, problem)
+    logdet = _logdet(solution.normal)
+    evidence = _log_evidence(own, 2 * m - p, logdet, float(np.log(area[~used]).sum()), n - m)
     sets: list[tuple[float, Mask]] = []
 
     def consider(out: tuple[int, ...], back: tuple[int, ...], total: float, larger: float) -> None:
@@ -186,7 +206,6 @@ def _other_choices(
         if value > evidence + np.log(NEGLIGIBLE):
             sets.append((value, other))
 
-    logdet = _logdet(solution.normal)
     inner, outer = np.flatnonzero(used).tolist(), np.flatnonzero(~used).tolist()
     gain = np.linalg.slogdet(deletion.expected)[1] - np.linalg.slogdet(solution.noise)[1]
     for k in inner:
@@ -222,8 +241,8 @@ def _evidence(solution: Solution, problem: Problem, mask: Mask) -> float:
     """Logarithm of how probable a choice of pairs is, but for a constant."""
     size = int(mask.sum())
     area = float(np.log(_areas(solution, problem)[~mask]).sum())
-    total = float(squares(solution)[mask].sum())
-    return _log_evidence(total, 2 * size - problem.unknowns, _logdet(solution.normal), area, len(mask) - size)
+    total = float(squares(solution)[mask].sum()) - assumed_lens(solution, problem, mask).explained
+    return _log_evidence(max(total, 0.0), 2 * size - problem.unknowns, _logdet(solution.normal), area, len(mask) - size)
 
 
 def _log_evidence(total: float, redundancy: int, logdet: float, log_area: float, wrong: int) -> float:

@@ -1,18 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a solved camera rests on, kept with it, so that whatever is measured with the camera can say so."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from ..errors import InputError
 from ..remarks import Remark
+from ..vectors import Array
+from .model import INTRINSICS
+
+POSE = ("rx", "ry", "rz", "x", "y", "z")
+"""The pose's parameters: turns about the camera's own axes [rad], and the position [m]."""
+PARAMETERS = (*POSE, *INTRINSICS)
 
 FEW_SPARE = 6
 """With so few observations more than unknowns neither a wrong pair nor a wrong lens shows."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CameraQuality:
     """From what a camera was solved.
 
@@ -23,6 +32,8 @@ class CameraQuality:
     left_out : names of the pairs that were left out as wrong.
     asked : names of pairs that are used, and that should be looked at again: the camera hangs on them.
     sigma_position_m : of the position, in the direction in which it was known worst [m]; infinite where it was not.
+    covariance : (15, 15) of `PARAMETERS`, pose and lens together, 0 for what was known; with what was assumed of the
+        lens. It is for pixels and rays: of the pose alone it tells less than `pose_covariance`. None when unknown.
     """
 
     pairs: int
@@ -30,6 +41,20 @@ class CameraQuality:
     left_out: tuple[str, ...] = ()
     asked: tuple[str, ...] = ()
     sigma_position_m: float = float("nan")
+    covariance: Array | None = None
+
+    @property
+    def of_pose_alone(self) -> "CameraQuality":
+        """The same for a pose that has been moved since, whose covariance is another one."""
+        return replace(self, covariance=None)
+
+    def turned(self, turn: Array) -> "CameraQuality":
+        """The same for a world whose axes were turned, by (3, 3)."""
+        if self.covariance is None:
+            return self
+        whole = np.eye(len(self.covariance))
+        whole[3:6, 3:6] = turn
+        return replace(self, covariance=whole @ self.covariance @ whole.T)
 
 
 def remarks_on_quality(quality: CameraQuality | None, camera: str) -> tuple[Remark, ...]:
@@ -56,29 +81,52 @@ def remarks_on_quality(quality: CameraQuality | None, camera: str) -> tuple[Rema
     return (Remark(text, "warning", f"camera {camera}"),)
 
 
-def to_plain(quality: CameraQuality) -> dict[str, int | float | list[str]]:
+def to_plain(quality: CameraQuality) -> dict[str, Any]:
     """For files: what is not known is left out."""
-    values: dict[str, int | float | list[str]] = {"pairs": quality.pairs, "redundancy": quality.redundancy}
+    values: dict[str, Any] = {"pairs": quality.pairs, "redundancy": quality.redundancy}
     values |= {"left_out": list(quality.left_out)} if quality.left_out else {}
     values |= {"asked": list(quality.asked)} if quality.asked else {}
+    if quality.covariance is not None:
+        known = np.flatnonzero(np.diagonal(quality.covariance))
+        values["covariance_of"] = [PARAMETERS[i] for i in known]
+        values["covariance"] = quality.covariance[np.ix_(known, known)].tolist()
     return values | ({} if np.isnan(quality.sigma_position_m) else {"sigma_position_m": quality.sigma_position_m})
 
 
-def from_plain(values: Mapping[str, object]) -> CameraQuality:
-    """From what `to_plain` gave."""
-    names = {key: tuple(str(name) for name in _list(values.get(key))) for key in ("left_out", "asked")}
-    numbers = {key: _number(values.get(key)) for key in ("pairs", "redundancy", "sigma_position_m")}
+def from_plain(values: Mapping[str, Any]) -> CameraQuality:
+    """From what `to_plain` gave.
+
+    Raises
+    ------
+    InputError : names and covariance do not fit each other.
+    """
     return CameraQuality(
-        int(numbers["pairs"]), int(numbers["redundancy"]), **names, sigma_position_m=numbers["sigma_position_m"]
+        int(values["pairs"]),
+        int(values["redundancy"]),
+        tuple(values.get("left_out", ())),
+        tuple(values.get("asked", ())),
+        float(values.get("sigma_position_m", float("nan"))),
+        whole_covariance(values["covariance_of"], values["covariance"]) if "covariance" in values else None,
     )
 
 
-def _list(value: object) -> list[object]:
-    return list(value) if isinstance(value, (list, tuple)) else []
+def whole_covariance(names: Sequence[str], matrix: ArrayLike) -> Array:
+    """(15, 15) of all `PARAMETERS` from that of some.
 
-
-def _number(value: object) -> float:
-    return float(value) if isinstance(value, (int, float)) else float("nan")
+    Raises
+    ------
+    InputError : a name is none of them or comes twice, or the matrix has another size.
+    """
+    some = np.asarray(matrix, dtype=np.float64)
+    if not set(names) <= set(PARAMETERS) or len(set(names)) < len(names) or some.shape != (len(names), len(names)):
+        raise InputError(
+            f"The covariance of {', '.join(names) or 'nothing'} is not a matrix with a row and a column for each",
+            advice=f"Parameters are {', '.join(PARAMETERS)}; remove it, or solve the camera again",
+        )
+    rows = [PARAMETERS.index(name) for name in names]
+    whole = np.zeros((len(PARAMETERS), len(PARAMETERS)))
+    whole[np.ix_(rows, rows)] = some
+    return whole
 
 
 def _counted(number: int, what: str) -> str:

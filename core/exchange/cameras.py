@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..camera.model import Camera
 from ..camera.pairs import Pairs
 from ..camera.path import CameraPath
-from ..camera.quality import CameraQuality, to_plain
+from ..camera.quality import PARAMETERS, CameraQuality, to_plain, whole_covariance
 from ..georeference import GlobalShift
 from ..least_squares import scales
 from ..output import write_text
@@ -272,7 +272,20 @@ def _quality(top: TomlTable) -> CameraQuality | None:
         left_out=table.texts("left_out", "P4"),
         asked=table.texts("asked", "P4"),
         sigma_position_m=float("nan") if sigma is None else float(sigma),
+        covariance=_whole_covariance(table),
     )
+
+
+def _whole_covariance(table: TomlTable) -> Array | None:
+    names = table.texts("covariance_of", "fx")
+    if not names:
+        return None
+    matrix = table.numbers("covariance", (len(names), len(names)))
+    if not set(names) <= set(PARAMETERS):
+        raise table.wrong("covariance_of", f"is {list(names)}", f"Choose from {', '.join(PARAMETERS)}")
+    if not _is_covariance(matrix):
+        raise table.wrong("covariance", "is not symmetric and positive", "Remove it, or solve the camera again")
+    return whole_covariance(names, matrix)
 
 
 def _covariance(top: TomlTable, key: str) -> Array | None:

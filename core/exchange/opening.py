@@ -79,7 +79,8 @@ def read_project_camera(
         None if matrix is None else turn @ matrix @ turn.T
         for matrix in (read.pose_covariance, read.pose_covariance_with_lens)
     )
-    return replace(read, path=path, pose_covariance=own, pose_covariance_with_lens=with_lens), notes
+    quality = None if read.quality is None else read.quality.turned(Z_UP)
+    return replace(read, path=path, pose_covariance=own, pose_covariance_with_lens=with_lens, quality=quality), notes
 
 
 def reconstruct_project(project: Project, surface: Surface | None, picks: Picks | None = None) -> Reconstruction:

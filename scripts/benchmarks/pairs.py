@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How often a wrong pair is found and a good one blamed, and whether a camera's intervals hold, with few pairs and many.
+"""How often a wrong pair is found and a good one blamed, and whether a camera's intervals hold, with 4 to 28 pairs.
 
 The truth is OpenCV's: points of a rough slope, projected by cv2.projectPoints, clicked with an error, some of them
 wrong. Nothing of Rockfall makes the data.
@@ -8,7 +8,8 @@ wrong. Nothing of Rockfall makes the data.
 """
 
 import argparse
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -109,87 +110,84 @@ def away(found: Resection, case: Case) -> tuple[Array, float]:
     return error / np.sqrt(np.diagonal(covariance)), float(error @ np.linalg.solve(covariance, error))
 
 
-def intervals(cases: int, first: int = 0, **how: object) -> None:
-    """Whether the intervals of the position hold."""
-    print(
-        f"{'pairs':>6} {'wrong':>6} {'f':>6} {'components':>11} {'position':>9} {'in doubt':>9} {'σ m':>7} {'error m':>8}"
-    )
-    for n in (4, 5, 6, 8, 12, 28):
-        for wrong in (0, 1):
-            for known in (True, False):
-                if n - wrong < (4 if known else 5):
-                    continue
-                inside, together, sigma, error, doubt = [], [], [], [], []
-                for number in range(cases):
-                    case = slope_case(first + number, n, wrong=wrong, **how)
-                    found = solved(case, focal_known=known)
-                    if found is None:
-                        continue
-                    if not found.used[case.wrong].any() or not wrong:
-                        parts, whole = away(found, case)
-                        inside += (np.abs(parts) < 1.96).tolist()
-                        together.append(whole < CHI2_3)
-                        with np.errstate(all="ignore"):
-                            sigma.append(np.sqrt(np.trace(np.nan_to_num(found.covariance[3:6, 3:6], posinf=1e6))))
-                        error.append(np.linalg.norm(found.camera.position - case.position))
-                print(
-                    f"{n:>6} {wrong:>6} {'known' if known else 'free':>6} {100 * np.mean(inside):>9.1f} % "
-                    f"{100 * np.mean(together):>7.1f} % {len(together):>9} {np.median(sigma):>7.2f} {np.median(error):>8.2f}"
-                )
+@dataclass
+class Tally:
+    """What became of many cases of one kind."""
+
+    lost: int = 0
+    found: int = 0
+    asked: int = 0
+    missed: int = 0
+    falsely_asked: int = 0
+    inside: list[bool] = field(default_factory=list)
+    together: list[bool] = field(default_factory=list)
+    error: list[float] = field(default_factory=list)
+    sigma: list[float] = field(default_factory=list)
 
 
-def verdicts(cases: int, first: int = 0, **how: object) -> None:
-    """Good pairs that were left out, wrong ones that were found, and what the position is off."""
+def tallied(cases: Iterable[Case], *, focal_known: bool = False) -> Tally:
+    """Solve cases and count.
+
+    `lost` are cases in which a good pair was left out; `found`, `asked`, `missed` are wrong pairs that were left out,
+    that are used and named, and that are used without a word; `falsely_asked` are cases in which a good one was named.
+    """
+    tally = Tally()
+    for case in cases:
+        found = solved(case, focal_known=focal_known)
+        if found is None:
+            tally.missed += len(case.wrong)
+            continue
+        rows = np.arange(len(case.pixels))
+        wrong, asked = np.isin(rows, case.wrong), np.isin(rows, [int(name) - 1 for name in found.asked])
+        tally.lost += bool((~found.used & ~wrong).any())
+        tally.found += int((~found.used & wrong).sum())
+        tally.asked += int((asked & wrong).sum())
+        tally.missed += int((found.used & wrong & ~asked).sum())
+        tally.falsely_asked += bool((asked & ~wrong).any())
+        parts, whole = away(found, case)
+        tally.inside += (np.abs(parts) < 1.96).tolist()
+        tally.together.append(whole < CHI2_3)
+        tally.error.append(float(np.linalg.norm(found.camera.position - case.position)))
+        tally.sigma.append(float(np.sqrt(np.trace(found.covariance[3:6, 3:6]))))
+    return tally
+
+
+def table(numbers: Sequence[int], wrong: Sequence[int], cases: int, first: int, **how: object) -> None:
+    """A row for each number of pairs and of wrong ones, with the focal length known and free."""
     print(
-        f"{'pairs':>6} {'wrong':>6} {'f':>6} {'good lost':>10} {'found':>7} {'asked':>7} {'missed':>7} {'falsely asked':>14} "
-        f"{'error m, median':>16} {'90 %':>6} {'σ holds':>8}"
+        "| pairs | wrong | f | good lost | found | asked | missed | falsely asked | error m: median, 90 % | σ m "
+        "| 95 %: components | position |"
     )
-    for n in (6, 8, 12, 28):
-        for wrong in (0, 1, 2):
+    print("|---|---|---|---|---|---|---|---|---|---|---|---|")
+    for n in numbers:
+        for bad in wrong:
             for known in (True, False):
-                if n - wrong < (4 if known else 5):
+                if n - bad < (4 if known else 5):
                     continue
-                lost = found_wrong = asked = missed = false_asked = 0
-                error, holds = [], []
-                for number in range(cases):
-                    case = slope_case(first + number, n, wrong=wrong, **how)
-                    found = solved(case, focal_known=known)
-                    if found is None:
-                        missed += wrong
-                        continue
-                    bad = np.isin(np.arange(n), case.wrong)
-                    doubted = {int(name) - 1 for name in found.asked}
-                    is_doubted = np.isin(np.arange(n), list(doubted))
-                    lost += bool((~found.used & ~bad).any())
-                    found_wrong += int((~found.used & bad).sum())
-                    asked += int((found.used & bad & is_doubted).sum())
-                    missed += int((found.used & bad & ~is_doubted).sum())
-                    false_asked += bool((is_doubted & ~bad).any())
-                    error.append(np.linalg.norm(found.camera.position - case.position))
-                    holds.append(away(found, case)[1] < CHI2_3)
-                of = max(1, wrong) * cases
-                print(
-                    f"{n:>6} {wrong:>6} {'known' if known else 'free':>6} {100 * lost / cases:>8.1f} % {100 * found_wrong / of:>5.0f} % "
-                    f"{100 * asked / of:>5.0f} % {100 * missed / of:>5.0f} % {100 * false_asked / cases:>12.1f} % "
-                    f"{np.median(error):>16.2f} {np.quantile(error, 0.9):>6.2f} {100 * np.mean(holds):>6.1f} %"
-                )
+                made = (slope_case(first + number, n, wrong=bad, **how) for number in range(cases))
+                t = tallied(made, focal_known=known)
+                of = max(1, bad) * cases
+                cells = [str(n), str(bad), "known" if known else "free", f"{100 * t.lost / cases:.0f} %"]
+                cells += [f"{100 * count / of:.0f} %" for count in (t.found, t.asked, t.missed)]
+                cells += [f"{100 * t.falsely_asked / cases:.0f} %"]
+                cells += [f"{np.median(t.error):.2f}, {np.quantile(t.error, 0.9):.2f}", f"{np.median(t.sigma):.2f}"]
+                cells += [f"{100 * np.mean(t.inside):.0f} %", f"{100 * np.mean(t.together):.0f} %"]
+                print(f"| {' | '.join(cells)} |", flush=True)
 
 
 def main() -> None:
-    """Both tables."""
+    """The table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=200)
     parser.add_argument("--first", type=int, default=0, help="seed of the first case")
+    parser.add_argument("--pairs", type=int, nargs="+", default=[4, 5, 6, 8, 12, 28])
+    parser.add_argument("--wrong", type=int, nargs="+", default=[0, 1, 2])
     parser.add_argument("--sigma", type=float, default=1.0, help="of the clicks [px]; 1 px is stated")
     parser.add_argument("--heavy", action="store_true", help="clicks with heavy tails")
-    parser.add_argument("--lens", action="store_true", help="lenses as those of telephones")
-    parser.add_argument("--only", choices=("intervals", "verdicts"))
+    parser.add_argument("--lens", action="store_true", help="lenses that are not what is assumed of them")
     arguments = parser.parse_args()
     how = {"sigma_px": arguments.sigma, "heavy": arguments.heavy, "lens_error": arguments.lens}
-    if arguments.only != "verdicts":
-        intervals(arguments.cases, arguments.first, **how)
-    if arguments.only != "intervals":
-        verdicts(arguments.cases, arguments.first, **how)
+    table(arguments.pairs, arguments.wrong, arguments.cases, arguments.first, **how)
 
 
 if __name__ == "__main__":

@@ -18,12 +18,14 @@ class AssumedLens:
 
     Attributes
     ----------
+    names : of the parameters.
     moment : (q, q) second moment of their errors: what the pairs say of them, with their prior, and how well.
     on_parameters : (p, q) by how much the p parameters move with them.
     on_residuals : (n, 2, q) by how much the residuals do [px].
     explained : by how much the squared residuals would be less with the lens that the pairs and the prior suggest.
     """
 
+    names: tuple[str, ...]
     moment: Array
     on_parameters: Array
     on_residuals: Array
@@ -53,7 +55,7 @@ def assumed_lens(solution: Solution, problem: Problem, used: Mask, variance: flo
     p, q = len(solution.normal), len(columns)
     spread = inverse(solution.normal)
     if not columns or not np.isfinite(spread).all():
-        return AssumedLens(np.zeros((q, q)), np.zeros((p, q)), np.zeros((len(used), 2, q)), 0.0)
+        return AssumedLens(columns, np.zeros((q, q)), np.zeros((p, q)), np.zeros((len(used), 2, q)), 0.0)
     derivatives = project_with_derivatives(solution.camera, problem.points).d_intrinsics
     slope = np.nan_to_num(derivatives[:, :, [INTRINSICS.index(name) for name in columns]])
     known = np.nan_to_num(solution.slopes)
@@ -65,4 +67,4 @@ def assumed_lens(solution: Solution, problem: Problem, used: Mask, variance: flo
     left = inverse((own + mixed.T @ effect) / variance + np.diag(prior**-2.0))
     found = left @ right / variance
     moment = left + np.outer(found, found)
-    return AssumedLens(moment, effect, slope + known @ effect, float(right @ found))
+    return AssumedLens(columns, moment, effect, slope + known @ effect, float(right @ found))

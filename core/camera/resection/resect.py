@@ -16,16 +16,13 @@ from ...least_squares import inverse
 from ...remarks import Remark
 from ...vectors import Array, Mask, distance_to_ray, norm
 from ..model import SIGMA_PX, Camera, rays
-from ..quality import CameraQuality
+from ..quality import POSE, CameraQuality
 from .adjustment import Solution, moved_with, sigma_without, without_each
 from .advice import Geometry, remarks_on
 from .pair_choice import choose, choose_near
 from .problem import Problem, basis_of, check_number, checked_pairs, free_columns, starting_camera
 from .starting import find_starts
 from .uncertainty import confidence, worst_sigma
-
-POSE = ("rx", "ry", "rz", "x", "y", "z")
-"""The pose's parameters: turns about the camera's own axes [rad], and the position [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +46,7 @@ class Resection:
     asked : names of pairs that are used, and that a person should look at again: the camera hangs on them.
     by_lens : (p, p) part of the covariance that comes from what was assumed of the lens.
     doubt : (n,) probability that a pair is wrong, of what the others say.
+    whole : (15, 15) covariance of pose and lens together, as in `CameraQuality`; None where it is infinite.
     """
 
     camera: Camera
@@ -65,6 +63,7 @@ class Resection:
     asked: tuple[str, ...]
     by_lens: Array
     doubt: Array
+    whole: Array | None
 
     @property
     def sigma(self) -> dict[str, float]:
@@ -95,7 +94,7 @@ class Resection:
     def quality(self) -> CameraQuality:
         """What the camera rests on."""
         worst = worst_sigma(self.covariance[3:6, 3:6])
-        return CameraQuality(int(self.used.sum()), self.redundancy, self.wrong, self.asked, worst)
+        return CameraQuality(int(self.used.sum()), self.redundancy, self.wrong, self.asked, worst, self.whole)
 
     def correlation(self, first: str, second: str) -> float:
         """Correlation of two parameters, −1…1; NaN when they are not determined."""
@@ -201,6 +200,7 @@ def resect(
         asked=tuple(name for name, *_ in geometry.asked),
         by_lens=known.by_lens,
         doubt=known.doubt,
+        whole=known.whole if np.isfinite(known.whole).all() else None,
     )
 
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from ...least_squares import inverse
 from ...vectors import Array, Mask, norm
-from ..model import Camera, vector_from_rotation
+from ..model import INTRINSICS, Camera, vector_from_rotation
 from .adjustment import Deletion, Solution, adjusted, squares, without_each
-from .assumed_lens import assumed_lens
+from .assumed_lens import AssumedLens, assumed_lens
 from .problem import Problem
 
 CLICKS_FREEDOM = 4.0
@@ -26,7 +26,7 @@ WRONG_WITHIN = 0.03
 """So far off a wrong pixel may be, in diagonals of the image."""
 NEGLIGIBLE = 1e-4
 """Choices less probable than this are not looked at."""
-DOUBTFUL = 0.02
+DOUBTFUL = 0.05
 """A pair that is wrong with this probability is worth a look."""
 HANGS = 1.5
 CHANCE = 0.02
@@ -50,6 +50,7 @@ class Confidence:
         for the scatter that so few residuals cannot show; of the position, 1.96 of them then hold 95 %.
     own : (p, p) what comes from the clicks alone.
     covariance : (p, p) all together; infinite where the pairs determine nothing.
+    whole : (15, 15) of the pose and the whole lens together, with what was assumed of it.
     by_lens : (p, p) the part of it that comes from what was assumed of the lens.
     by_choice : (p, p) the part that comes from which pairs were believed.
     doubt : (n,) probability that a pair is wrong.
@@ -61,6 +62,7 @@ class Confidence:
     factor: float
     own: Array
     covariance: Array
+    whole: Array
     by_lens: Array
     by_choice: Array
     doubt: Array
@@ -78,7 +80,8 @@ def confidence(solution: Solution, problem: Problem, used: Mask, rival: Solution
     """
     factor, deletion = scale_factor(solution, problem, used), without_each(solution)
     own = inverse(solution.normal) * factor**2
-    by_lens = assumed_lens(solution, problem, used, factor**2).covariance
+    lens = assumed_lens(solution, problem, used, factor**2)
+    by_lens = lens.covariance
     by_choice, doubt = np.zeros_like(own), np.where(used, 0.0, 1.0)
     if np.isfinite(own).all():
         by_choice, doubt = _by_choice(solution, problem, used, rival, own, deletion, robust)
@@ -87,12 +90,23 @@ def confidence(solution: Solution, problem: Problem, used: Mask, rival: Solution
         factor=factor,
         own=own,
         covariance=own + by_lens + by_choice,
+        whole=_of_all_parameters(own + by_choice, problem, lens),
         by_lens=by_lens,
         by_choice=by_choice,
         doubt=doubt,
         asked=used & ((doubt > DOUBTFUL) | _hanging(solution, problem, used, deletion, own + by_lens)),
         moved_m=norm(deletion.moved[:, 3:6]),
     )
+
+
+def _of_all_parameters(covariance: Array, problem: Problem, lens: AssumedLens) -> Array:
+    """(15, 15) of pose and lens: of the (p, p) that were found, and of the lens that was assumed with what it moves."""
+    found = np.zeros((15, len(covariance)))
+    found[:6, :6] = np.eye(6)
+    found[6:, 6:] = problem.basis
+    assumed = found @ lens.on_parameters
+    assumed[[6 + INTRINSICS.index(name) for name in lens.names], range(len(lens.names))] += 1.0
+    return np.asarray(found @ covariance @ found.T + assumed @ lens.moment @ assumed.T)
 
 
 def _hanging(solution: Solution, problem: Problem, used: Mask, deletion: Deletion, covariance: Array) -> Mask:

@@ -130,16 +130,15 @@ def _on_clocks(scene: bpy.types.Scene, unset: bpy.types.Object, active: bpy.type
 def _with_cameras(scene: bpy.types.Scene, camera: bpy.types.Object | None, picks: list[bpy.types.Object]) -> NextStep:
     """Once the cameras stand: pick, refine, look at it."""
     weak = " ".join(remark.text for remark in problems.of_cameras(scene))
-    if not picks and weak:
-        return NextStep(f"{weak} Or pick with it as it is.", ("rockfall.align_views", PICK_TOOL))
     if not picks:
+        first = ("rockfall.align_views",) if weak else ()
         if len(sightings.seen_in(camera, places.trajectory(scene))):
             sentence = "The block is tracked. Propose its impacts, or click the block at each (step with ← →)."
-            return NextStep(sentence, ("rockfall.propose_impacts", PICK_TOOL))
+            return NextStep(f"{weak} {sentence}".strip(), (*first, "rockfall.propose_impacts", PICK_TOOL))
         sentence = "Step to an impact with ← →, and click the block there. Each further impact adds a flight."
         if camera is not None and alignment.is_taken_for_a_tripod(camera):
             sentence += " Was the camera held by hand? Then follow the background first (step 3, Hand-held)."
-        return NextStep(sentence, (PICK_TOOL,))
+        return NextStep(f"{weak} {sentence}".strip(), (*first, PICK_TOOL))
     found = proposal.read(scene)
     if found is not None:
         return _on_proposal(found, weak)

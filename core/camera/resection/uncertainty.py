@@ -221,7 +221,9 @@ def _other_choices(problem: Problem, solution: Solution, deletion: Deletion, use
             sets.append((value, other))
 
     inner, outer = np.flatnonzero(used).tolist(), np.flatnonzero(~used).tolist()
-    gain = np.linalg.slogdet(deletion.expected)[1] - np.linalg.slogdet(solution.noise)[1]
+    checked = np.isfinite(squared)
+    gain = np.full(n, np.nan)
+    gain[checked] = np.linalg.slogdet(deletion.expected[checked])[1] - np.linalg.slogdet(solution.noise[checked])[1]
     for k in inner:
         consider((k,), (), own - squared[k], logdet - gain[k])
     for i in outer:

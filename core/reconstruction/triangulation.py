@@ -64,7 +64,8 @@ def pick_on_terrain(
     sigma_px : (n,) standard deviation of u and of v [px].
     position, rotation : (n, 3) and (n, 3, 3), a pose for each pixel instead of the camera's own.
     pose_covariance : (6, 6) or (n, 6, 6) of the poses: rotation vector [rad] about the axes of the camera in that
-        picture, and position [m]; without it the poses are taken to be exact.
+        picture, and position [m]; without it the poses are taken to be exact. (15, 15) or (n, 15, 15) with the lens, in
+        the order of `INTRINSICS`.
     sigma_terrain_m : accuracy of the terrain, see `ground_errors.normal_variance`; 0 for an exact one.
 
     Notes

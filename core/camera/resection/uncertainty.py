@@ -101,6 +101,8 @@ def confidence(solution: Solution, problem: Problem, used: Mask, rival: Solution
 
 def _of_all_parameters(covariance: Array, problem: Problem, lens: AssumedLens) -> Array:
     """(15, 15) of pose and lens: of the (p, p) that were found, and of the lens that was assumed with what it moves."""
+    if not np.isfinite(covariance).all():
+        return np.full((15, 15), np.inf)
     found = np.zeros((15, len(covariance)))
     found[:6, :6] = np.eye(6)
     found[6:, 6:] = problem.basis

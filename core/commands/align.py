@@ -143,6 +143,7 @@ def run(arguments: argparse.Namespace) -> int:
             sigma=aligned.found.sigma,
             pose_covariance=aligned.pose_covariance,
             pose_covariance_with_lens=aligned.pose_covariance_with_lens,
+            quality=aligned.found.quality,
         )
         write_pair_residuals(folder / "pairs_residuals.csv", pairs, residual_px, residual_m, aligned.used)
         written = ["camera.toml", "pairs_residuals.csv"]

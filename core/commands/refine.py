@@ -186,6 +186,7 @@ def _write(
                 sigma=held | dict(zip(POSE, np.sqrt(np.diag(covariance)).tolist(), strict=True)),
                 crs=camera.crs,
                 pose_covariance=covariance,
+                quality=None if camera.quality is None else camera.quality.of_pose_alone,
                 extra=camera.extra,
             )
             entries[entry.name] = replace(entries[entry.name], camera=file)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..camera.model import Camera
 from ..camera.pairs import Pairs
 from ..camera.path import CameraPath
+from ..camera.quality import PARAMETERS, CameraQuality, to_plain, whole_covariance
 from ..georeference import GlobalShift
 from ..least_squares import scales
 from ..output import write_text
@@ -47,6 +48,7 @@ class CameraFile:
         the path and holds the lens needs; None when unknown.
     pose_covariance_with_lens : (6, 6) the same with what is not known of the lens in it: how well the pose is known;
         None where it is the same or unknown.
+    quality : what the camera was solved from; None when unknown.
     extra : keys that this version does not know.
     """
 
@@ -56,6 +58,7 @@ class CameraFile:
     crs: str = ""
     pose_covariance: Array | None = None
     pose_covariance_with_lens: Array | None = None
+    quality: CameraQuality | None = None
     extra: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -96,6 +99,7 @@ def read_camera(path: str | Path, shift: GlobalShift | None = None) -> CameraFil
         crs=crs,
         pose_covariance=covariance,
         pose_covariance_with_lens=with_lens,
+        quality=_quality(top),
         extra=top.rest(),
     )
 
@@ -109,6 +113,7 @@ def write_camera(
     crs: str = "",
     pose_covariance: Array | None = None,
     pose_covariance_with_lens: Array | None = None,
+    quality: CameraQuality | None = None,
     extra: Mapping[str, Any] | None = None,
 ) -> None:
     """Write camera.toml, each number so that it reads back as the same double; see `CameraFile`."""
@@ -130,6 +135,8 @@ def write_camera(
     lines += [_numbers(key, value) for key, value in named.items() if value is not None and np.isfinite(value).all()]
     if known := {name: value for name, value in (sigma or {}).items() if np.isfinite(value)}:
         lines += ["", "[sigma]", *(_numbers(name, value) for name, value in known.items())]
+    if quality is not None:
+        lines += ["", *tomli_w.dumps({"quality": to_plain(quality)}).splitlines()]
     if tables:
         lines += ["", *tomli_w.dumps(tables).splitlines()]
     for i, position in enumerate([] if path.is_fixed else to_survey(path.position)):
@@ -249,6 +256,36 @@ def _rotation(table: TomlTable) -> Array:
         left, _, right = np.linalg.svd(rows)
         rows = left @ right
     return rows
+
+
+def _quality(top: TomlTable) -> CameraQuality | None:
+    """What the camera rests on; None in files of earlier versions and of other programs."""
+    if not top.has("quality"):
+        return None
+    table = top.table("quality")
+    sigma = table.take("sigma_position_m")
+    if sigma is not None and not (isinstance(sigma, (int, float)) and sigma > 0):
+        raise table.wrong("sigma_position_m", f"is {sigma!r}, no standard deviation", "Give metres, or leave it out")
+    return CameraQuality(
+        pairs=table.whole("pairs", zero_allowed=True),
+        redundancy=table.whole("redundancy", zero_allowed=True),
+        left_out=table.texts("left_out", "P4"),
+        asked=table.texts("asked", "P4"),
+        sigma_position_m=float("nan") if sigma is None else float(sigma),
+        covariance=_whole_covariance(table),
+    )
+
+
+def _whole_covariance(table: TomlTable) -> Array | None:
+    names = table.texts("covariance_of", "fx")
+    if not names:
+        return None
+    matrix = table.numbers("covariance", (len(names), len(names)))
+    if not set(names) <= set(PARAMETERS):
+        raise table.wrong("covariance_of", f"is {list(names)}", f"Choose from {', '.join(PARAMETERS)}")
+    if not _is_covariance(matrix):
+        raise table.wrong("covariance", "is not symmetric and positive", "Remove it, or solve the camera again")
+    return whole_covariance(names, matrix)
 
 
 def _covariance(top: TomlTable, key: str) -> Array | None:

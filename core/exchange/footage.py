@@ -47,7 +47,15 @@ class ReadVideo:
     @property
     def seen(self) -> SeenVideo:
         """What was seen in it."""
-        view = View(self.entry.name, self.camera.path, self.clock, self.entry.row_time_s, self.camera.pose_covariance)
+        camera, quality = self.camera, self.camera.quality
+        view = View(
+            self.entry.name,
+            camera.path,
+            self.clock,
+            self.entry.row_time_s,
+            camera.pose_covariance,
+            None if quality is None else quality.covariance,
+        )
         track = NO_SIGHTINGS if self.track is None else self.track
         return SeenVideo(view, track, NO_EVENTS if self.events is None else self.events)
 

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From project.toml to numbers: its terrain, its picks, and what is reconstructed from them."""
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
 import numpy as np
 
-from ..errors import InputError
+from ..camera.quality import remarks_on_quality
+from ..errors import InputError, RockfallError
 from ..georeference import Z_UP, GlobalShift
 from ..reconstruction.block import Block
 from ..reconstruction.choices import FlightEnds
@@ -68,6 +70,7 @@ def read_project_camera(
     hint = "" if surface is None else unit_hint(path.position, surface, FAR_CAMERA_M)
     if hint:
         notes = (*notes, f"The camera {file.name} is far from the terrain. {hint}.")
+    notes = (*notes, *map(str, remarks_on_quality(read.quality, file.name)))
     if path is read.path:
         return read, notes
     turn = np.eye(6)
@@ -76,7 +79,8 @@ def read_project_camera(
         None if matrix is None else turn @ matrix @ turn.T
         for matrix in (read.pose_covariance, read.pose_covariance_with_lens)
     )
-    return replace(read, path=path, pose_covariance=own, pose_covariance_with_lens=with_lens), notes
+    quality = None if read.quality is None else read.quality.turned(Z_UP)
+    return replace(read, path=path, pose_covariance=own, pose_covariance_with_lens=with_lens, quality=quality), notes
 
 
 def reconstruct_project(project: Project, surface: Surface | None, picks: Picks | None = None) -> Reconstruction:
@@ -100,7 +104,18 @@ def reconstruct_project(project: Project, surface: Surface | None, picks: Picks 
         site=project.site.name,
         flights=cast(FlightEnds, how.flights),
     )
-    return replace(made, remarks=(*(Remark(note, about="picks") for note in notes), *made.remarks))
+    remarks = (*(Remark(note, about="picks") for note in notes), *camera_remarks(project))
+    return replace(made, remarks=(*remarks, *made.remarks))
+
+
+def camera_remarks(project: Project) -> tuple[Remark, ...]:
+    """What is to be known of the cameras that a project's picks were made with; nothing of one that cannot be read."""
+    found: list[Remark] = []
+    for video in project.videos:
+        if video.camera is not None:
+            with suppress(RockfallError, OSError):
+                found += remarks_on_quality(read_camera(video.camera).quality, video.name)
+    return tuple(found)
 
 
 def open_terrain(project: Project) -> Surface | None:

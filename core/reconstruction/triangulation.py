@@ -64,7 +64,8 @@ def pick_on_terrain(
     sigma_px : (n,) standard deviation of u and of v [px].
     position, rotation : (n, 3) and (n, 3, 3), a pose for each pixel instead of the camera's own.
     pose_covariance : (6, 6) or (n, 6, 6) of the poses: rotation vector [rad] about the axes of the camera in that
-        picture, and position [m]; without it the poses are taken to be exact.
+        picture, and position [m]; without it the poses are taken to be exact. (15, 15) or (n, 15, 15) with the lens, in
+        the order of `INTRINSICS`.
     sigma_terrain_m : accuracy of the terrain, see `ground_errors.normal_variance`; 0 for an exact one.
 
     Notes
@@ -117,9 +118,15 @@ def pick_on_terrain(
 
 
 def _by_pose(seen: Projection, pose_covariance: Array, rows: Indices, n: int) -> Array:
-    """(k, 2, 2) of pixels from (6, 6) or (n, 6, 6) of poses, for the k rows of n that were projected [px²]."""
-    poses = np.broadcast_to(np.asarray(pose_covariance, dtype=np.float64), (n, 6, 6))[rows]
+    """(k, 2, 2) of pixels from (6, 6) or (n, 6, 6) of poses, for the k rows of n that were projected [px²].
+
+    With 15 in place of 6, the lens is in it, too.
+    """
+    matrix = np.asarray(pose_covariance, dtype=np.float64)
+    poses = np.broadcast_to(matrix, (n, *matrix.shape[-2:]))[rows]
     by_pose = np.concatenate([seen.d_rotation, seen.d_position], axis=2)
+    if matrix.shape[-1] > by_pose.shape[2]:
+        by_pose = np.concatenate([by_pose, seen.d_intrinsics], axis=2)
     return np.asarray(by_pose @ poses @ np.swapaxes(by_pose, 1, 2))
 
 
@@ -188,7 +195,7 @@ def triangulate(
     cameras : v, with their poses at that time.
     pixels : (v, n, 2) [px]; NaN where a view does not see the point.
     sigma_px : (v, n) or a number, standard deviation of u and of v [px].
-    pose_covariances : v of (6, 6), as of `pick_on_terrain`; those of different views are independent.
+    pose_covariances : v of (6, 6) or (15, 15), as of `pick_on_terrain`; those of different views are independent.
 
     Raises
     ------

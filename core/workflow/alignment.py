@@ -8,8 +8,9 @@ import numpy as np
 
 from ..camera.model import GUESSED_FOCAL, SIGMA_PX, Camera, pinhole
 from ..camera.pairs import Pairs
+from ..camera.quality import POSE
 from ..camera.resection.problem import POSE_PAIRS
-from ..camera.resection.resect import POSE, Resection, resect
+from ..camera.resection.resect import Resection, resect
 from ..errors import InputError, RockfallError
 from ..footage.advice import uneven_pixels
 from ..georeference import GlobalShift

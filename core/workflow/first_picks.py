@@ -161,7 +161,7 @@ def place_clicked(
     about = touching if np.isfinite(touching).all() else pick_on_terrain(camera, seen[None], surface).point[0]
     distance = float(norm(about - camera.position)) if np.isfinite(about).all() else FAR_M
     sigma_terrain = default_accuracy(surface) if sigma_terrain_m is None else sigma_terrain_m
-    pose = view.covariance_at(video_s, distance)
+    pose = view.ray_covariance_at(video_s, distance)
     known = bool(np.isfinite(pose).all())
     found = pick_on_terrain(
         camera, seen[None], surface, sigma_px, pose_covariance=pose if known else None, sigma_terrain_m=sigma_terrain
@@ -194,8 +194,8 @@ def point_clicked(
     pixel, sigma = np.asarray(pixels, dtype=np.float64)[:, None], np.asarray(sigma_px, dtype=np.float64)[:, None]
     about = triangulate(cameras, pixel, sigma).point[0]
     distances = [float(np.nan_to_num(norm(about - camera.position), nan=FAR_M)) for camera in cameras]
-    covariances = [view.covariance_at(time, far) for view, time, far in zip(views, video_s, distances, strict=True)]
-    if not np.isfinite(covariances).all():
+    covariances = [view.ray_covariance_at(time, far) for view, time, far in zip(views, video_s, distances, strict=True)]
+    if not all(np.isfinite(covariance).all() for covariance in covariances):
         return replace(triangulate(cameras, pixel, sigma), covariance=np.full((1, 3, 3), np.inf))
     return triangulate(cameras, pixel, sigma, pose_covariances=covariances)
 

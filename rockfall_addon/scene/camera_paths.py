@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The solved path of a video's camera: stored in doubles, shown as Blender's lens, place and keys."""
 
+import json
+
 import bpy
 import numpy as np
 
 from ...core.camera.blender_lens import BlenderLens, from_blender_lens, pose_to_blender, to_blender_lens
 from ...core.camera.model import INTRINSICS, Camera
 from ...core.camera.path import CameraPath, fixed
+from ...core.camera.quality import CameraQuality, from_plain, to_plain
 from ...core.errors import RockfallError
 from ...core.vectors import Array
 from . import camera_keys, clocks, georeference, store, timing, videos
@@ -51,6 +54,7 @@ def set_camera_path(
     *,
     rmse_px: float | None = None,
     pose_covariance: Array | None = None,
+    quality: CameraQuality | None = None,
 ) -> None:
     """Store a solved camera, exactly, and show it: lens, place, and keys when it moves.
 
@@ -59,6 +63,7 @@ def set_camera_path(
     path : its pictures have the size of the video's.
     pose_covariance : (6, 6) of rotation [rad] and position [m], of the whole path; one that is not finite, since the
         pairs do not determine it, is not kept.
+    quality : what it was solved from; None when unknown.
 
     Raises
     ------
@@ -87,6 +92,10 @@ def set_camera_path(
             camera[key] = float(value) if key == store.RMSE else np.asarray(value, np.float64).ravel().tolist()
         elif key in camera:
             del camera[key]
+    if quality is not None:
+        camera[store.CAMERA_QUALITY] = json.dumps(to_plain(quality))
+    elif store.CAMERA_QUALITY in camera:
+        del camera[store.CAMERA_QUALITY]
     camera[store.SOLVED] = True
     write_lens(camera, one)
     write_keys(scene, camera)
@@ -104,6 +113,12 @@ def unsolve(camera: bpy.types.Object) -> None:
 def pose_covariance(camera: bpy.types.Object) -> Array | None:
     """(6, 6) of the solved pose; None when unknown."""
     return np.array(camera[store.POSE_COVARIANCE]).reshape(6, 6) if store.POSE_COVARIANCE in camera else None
+
+
+def quality_of(camera: bpy.types.Object) -> CameraQuality | None:
+    """What a solved camera rests on; None when unknown."""
+    values = store.read_json(camera, store.CAMERA_QUALITY, {}) if is_solved(camera) else {}
+    return from_plain(values) if {"pairs", "redundancy"} <= values.keys() else None
 
 
 def write_keys(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:

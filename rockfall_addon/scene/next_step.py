@@ -129,17 +129,19 @@ def _on_clocks(scene: bpy.types.Scene, unset: bpy.types.Object, active: bpy.type
 
 def _with_cameras(scene: bpy.types.Scene, camera: bpy.types.Object | None, picks: list[bpy.types.Object]) -> NextStep:
     """Once the cameras stand: pick, refine, look at it."""
+    weak = " ".join(remark.text for remark in problems.of_cameras(scene))
     if not picks:
+        first = ("rockfall.align_views",) if weak else ()
         if len(sightings.seen_in(camera, places.trajectory(scene))):
             sentence = "The block is tracked. Propose its impacts, or click the block at each (step with ← →)."
-            return NextStep(sentence, ("rockfall.propose_impacts", PICK_TOOL))
+            return NextStep(f"{weak} {sentence}".strip(), (*first, "rockfall.propose_impacts", PICK_TOOL))
         sentence = "Step to an impact with ← →, and click the block there. Each further impact adds a flight."
         if camera is not None and alignment.is_taken_for_a_tripod(camera):
             sentence += " Was the camera held by hand? Then follow the background first (step 3, Hand-held)."
-        return NextStep(sentence, (PICK_TOOL,))
+        return NextStep(f"{weak} {sentence}".strip(), (*first, PICK_TOOL))
     found = proposal.read(scene)
     if found is not None:
-        return _on_proposal(found)
+        return _on_proposal(found, weak)
     if not store.has_role(scene, store.FLIGHTS_ROLE) and not _grave(problems.remarks(scene)):
         where = "Step to" if camera is not None else "Move the timeline to the time of"
         sentence = f"{where} the next impact, and click there: a flight is between two picks of a run."
@@ -154,18 +156,22 @@ def _with_cameras(scene: bpy.types.Scene, camera: bpy.types.Object | None, picks
         sentence = next((remark.text for remark in _beyond(scene, picks)), sentence)
         return NextStep(sentence, (PICK_TOOL, "rockfall.refine"))
     sentence = "Play the fall; then models, simulation, film and tables: steps 6 to 10."
+    sentence += f" {weak}" if weak else ""
     return NextStep(sentence, ("screen.animation_play", "rockfall.export_tables"))
 
 
-def _on_proposal(found: proposal.Proposal) -> NextStep:
-    """What speaks against it comes before the numbers, and it is not offered first then."""
+def _on_proposal(found: proposal.Proposal, weak: str) -> NextStep:
+    """What speaks against it comes before the numbers, and it is not offered first then.
+
+    weak : what is to be known of the cameras.
+    """
     if found.stale:
         sentence = "The picks were changed since they were refined: refine again."
         return NextStep(sentence, ("rockfall.refine", "rockfall.discard_refinement"))
     numbers = (
         f"{found.before_px:.2f} px from the tracked pixels before, {found.after_px:.2f} px after. "
         "The new flights are light blue in the free view; step 5 has the numbers."
-    )
+    ) + (f" {weak}" if weak else "")
     decide = ("rockfall.apply_refinement", "rockfall.discard_refinement")
     worries = _grave(found.remarks)
     if worries:

@@ -3,16 +3,18 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import wraps
 from pathlib import Path
 
 import bpy
 import numpy as np
 
+from ...core.camera.quality import remarks_on_quality
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark, from_plain, from_text, gravest_first, to_plain, to_text
 from ...core.workflow.noticed import impossible_sizes
-from . import fingerprints, migration, picks, set_aside_words, store, timing
+from . import camera_paths, fingerprints, migration, picks, set_aside_words, store, timing
 
 MOST = 6
 BACKSIDE = -0.17  # vertical part of a normal that points 10° or more below the horizon
@@ -95,6 +97,12 @@ def remarks(scene: bpy.types.Scene) -> list[Remark]:
     return [*newer, *_troubles, *from_text(str(scene.get(store.PROBLEM, "")), "warning")]
 
 
+def of_cameras(scene: bpy.types.Scene) -> list[Remark]:
+    """What is to be known of solved cameras that few pairs determine, for all that is measured with them."""
+    cameras = store.of_role(scene, CAMERA_ROLE)
+    return [said for camera in cameras for said in remarks_on_quality(camera_paths.quality_of(camera), camera.name)]
+
+
 def guarded[**P, T](function: Callable[P, T]) -> Callable[P, T | None]:
     """For what Blender calls: an error is caught, printed in one line and shown on the panel, each text once."""
 
@@ -127,6 +135,8 @@ def _of_scene(scene: bpy.types.Scene) -> list[Remark]:
     said = set_aside_words.remarks(scene)
     if not said and store.HAS_SET_ASIDE in scene:
         del scene[store.HAS_SET_ASIDE]
+    # Advice beside the picks, since they may be the only pairs there are: nothing else has to wait for it.
+    said += [replace(one, severity="advice") for one in of_cameras(scene)]
     for path, count in store.linked_files(scene).items():
         many = f"{count} objects of Rockfall are" if count > 1 else "An object of Rockfall is"
         text = (

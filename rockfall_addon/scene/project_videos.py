@@ -109,6 +109,7 @@ def show_videos(scene: bpy.types.Scene, found: list[ReadVideo], name: str = "") 
                 read.camera.path,
                 rmse_px=read.camera.rmse_px,
                 pose_covariance=read.camera.pose_covariance,
+                quality=read.camera.quality,
             )
         if read.track is not None:
             _keep_track(camera, read.track, name)
@@ -136,6 +137,7 @@ def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]
                 rmse_px=None if rmse is None else float(rmse),
                 crs=georeference.read_shift(scene).crs,
                 pose_covariance=camera_paths.pose_covariance(camera),
+                quality=camera_paths.quality_of(camera),
             )
         track = _track_of(camera)
         if track is not None:

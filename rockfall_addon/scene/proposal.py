@@ -259,7 +259,11 @@ def _apply_shared(scene: bpy.types.Scene, kept: dict[str, Any]) -> None:
             )
             covariance = np.array(poses["covariance"]).reshape(6, 6)
             rmse_px = kept["rmse_px"][identifier]
-            camera_paths.set_camera_path(scene, camera, new, rmse_px=rmse_px, pose_covariance=covariance)
+            quality = camera_paths.quality_of(camera)
+            quality = None if quality is None else quality.of_pose_alone
+            camera_paths.set_camera_path(
+                scene, camera, new, rmse_px=rmse_px, pose_covariance=covariance, quality=quality
+            )
     if "gravity" in kept["free"]:
         scene[store.GRAVITY] = kept["gravity_mps2"]
     if "drag" in kept["free"] and kept["drag"] is not None:

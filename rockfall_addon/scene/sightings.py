@@ -75,12 +75,14 @@ def view_of(camera: bpy.types.Object) -> View:
     ------
     RockfallError : it is not aligned.
     """
+    quality = camera_paths.quality_of(camera)
     return View(
         camera.name,
         pictures.aligned_path(camera),
         clocks.clock_of(camera),
         videos.row_time_of(camera),
         camera_paths.pose_covariance(camera),
+        None if quality is None else quality.covariance,
     )
 
 

@@ -122,6 +122,7 @@ STILL = "rockfall_still"  # of an image: the number of the picture that it holds
 
 # of a camera: where it stood and how it looked
 CAMERA, SOLVED, RMSE = "rockfall_camera", "rockfall_solved", "rockfall_rmse_px"
+CAMERA_QUALITY = "rockfall_camera_quality"  # what it was solved from, JSON
 POSE_TIMES, POSES = "rockfall_pose_times_s", "rockfall_poses"
 POSE_SIGMA, POSE_COVARIANCE = "rockfall_pose_sigma", "rockfall_pose_covariance"
 CAMERA_SHIFT, ASPECT, REFERENCE_POSE = "rockfall_camera_shift_m", "rockfall_aspect", "rockfall_reference_pose"

@@ -143,6 +143,7 @@ BY_ROLE: dict[str, Kept] = {
             store.TRACK_NAMES: json_of(list, _texts),
             store.TRACK_ROWS: series(PER_SIGHTING, unknown=SIGMA_OF_SIGHTING),
             store.SOLUTION: json_of(dict),
+            store.CAMERA_QUALITY: json_of(dict),
             store.FOLLOWED: json_of(dict),
             store.EVENTS: json_of(dict),
             store.KNOWN_LENS: numbers(9),

@@ -209,6 +209,38 @@ def test_solved_from_the_fifth_pair_on_and_predicted_from_then(
     assert aligned.solution_of(camera).rmse_px != pytest.approx(before, rel=1e-9)
 
 
+def test_what_is_made_with_a_camera_of_five_pairs_says_so(part, scene, camera, marking, table, slope, tmp_path) -> None:
+    """In the next step, beside the picks, in the written camera, and in the view whose clicks it covers."""
+    slope(table)
+    for i in range(5):
+        marking.mark(scene, camera, "pixel", table.pixel[i])
+        pair = part("rockfall_addon.scene.pairs").open_pair(camera)
+        if pair.proposed:
+            marking.move(scene, camera, pair.id, "point", table.point[i])
+        else:
+            marking.mark(scene, camera, "point", table.point[i])
+    rests = f"measured with the camera {camera.name} rests on 5 pairs (3 observations more than unknowns)"
+    step = part("rockfall_addon.scene.next_step").next_step(scene)
+    assert rests in step.sentence
+    assert step.actions[0] == "rockfall.align_views"
+    problems = part("rockfall_addon.scene.problems")
+    problems.update(scene)
+    (said,) = [remark for remark in problems.remarks(scene) if rests in remark.text]
+    assert said.severity == "advice", "picking need not wait for it"
+    bpy.ops.rockfall.export_camera(filepath=str(tmp_path / "camera.toml"))
+    written = part("core.exchange.cameras").read_camera(tmp_path / "camera.toml").quality
+    assert (written.pairs, written.redundancy) == (5, 3)
+    view = part("rockfall_addon.scene.sightings").view_of(camera)
+    np.testing.assert_array_equal(view.camera_covariance, written.covariance)
+    found = solved_by_core(part, table, slice(0, 5))
+    np.testing.assert_allclose(view.camera_covariance, found.whole, rtol=0.02, atol=1e-9)
+    bpy.ops.rockfall.import_camera(filepath=str(tmp_path / "camera.toml"))
+    assert rests in part("rockfall_addon.scene.next_step").next_step(scene).sentence
+    placed = part("rockfall_addon.scene.camera_paths").camera_path(camera).reference
+    part("rockfall_addon.steps.alignment.solving").place_by_eye(scene, camera, placed)
+    assert rests not in part("rockfall_addon.scene.next_step").next_step(scene).sentence
+
+
 def test_known_focal_length_needs_four_pairs(part, scene, marking, camera, table) -> None:
     settings = camera.rockfall_alignment
     settings.focal_px = 2100.0

@@ -39,6 +39,29 @@ def test_the_ellipse_is_the_spread_of_draws():
     np.testing.assert_allclose(np.cov(pick_on_terrain(camera, draws, GROUND).point.T), found.covariance[0], atol=3e-4)
 
 
+def test_a_lens_and_a_pose_that_depend_on_each_other_spread_a_click_as_draws_of_both_do():
+    """A focal length that is 0.5 % uncertain while the camera backs away along: of a click, and of one in two views."""
+    camera = replace(look_at(2000, 1000, (30, -100, 40), (0, 0, 0), focal_px=1500.0), k1=-0.1)
+    back = -camera.rotation[2] * camera.position @ camera.rotation[2] / camera.fx
+    whole = np.zeros((15, 15))
+    change = np.zeros(15)
+    change[3:6], change[6:8] = back, 1.0  # metres and pixels of focal length for one pixel of it
+    change *= 7.5
+    pixel = np.array([[700.0, 420.0]])
+    found = pick_on_terrain(camera, pixel, GROUND, 1e-6, pose_covariance=whole + np.outer(change, change))
+    ends = [
+        pick_on_terrain(replace(camera, position=camera.position + k * change[3:6], fx=camera.fx + k * change[6],
+                                fy=camera.fy + k * change[7]), pixel, GROUND).point[0]
+        for k in (-0.1, 0.1)
+    ]  # fmt: skip
+    moved = (ends[1] - ends[0]) / 0.2
+    np.testing.assert_allclose(found.covariance[0], np.outer(moved, moved), atol=1e-3 * float(moved @ moved))
+    cameras, pixels = [camera, CAMERAS[0]], np.stack([project(camera, found.point), project(CAMERAS[0], found.point)])
+    sharp = triangulate(cameras, pixels, 0.1)
+    both = triangulate(cameras, pixels, 0.1, pose_covariances=[np.outer(change, change), np.zeros((6, 6))])
+    assert np.trace(both.covariance[0]) > 1.05 * np.trace(sharp.covariance[0])
+
+
 def test_grazing_and_missing_rays_are_told():
     camera = look_at(2000, 1000, (0, -100, 5), (0, 0, 0), focal_px=1000.0)
     found = pick_on_terrain(camera, [[1000.0, 500.0], [1000.0, 100.0]], GROUND)

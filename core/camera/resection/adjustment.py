@@ -19,14 +19,15 @@ HUBER = 3.0
 class Solution:
     """A camera, the residuals of all pairs, (n, 2) [px], their derivatives (n, 2, p) and covariances (n, 2, 2).
 
-    `normal` and `right` are the weighted normal equations of the pairs in use, `cost` is Huber's, `misfit` that plus
-    what makes solutions with different covariances comparable.
+    `weight` (n,) is Huber's of each pair, 0 of those that are not used; `normal` and `right` are the normal equations
+    with these weights, `cost` is Huber's, `misfit` that plus what makes solutions with other covariances comparable.
     """
 
     camera: Camera
     residual: Array
     slopes: Array
     noise: Array
+    weight: Array
     normal: Array
     right: Array
     cost: float
@@ -127,11 +128,14 @@ def _measured(camera: Camera, problem: Problem, used: Mask, noise: Array, trust:
     flat = slope.reshape(-1, slope.shape[2])
     tall = ((trust * weight[:, None, None]) @ slope).reshape(flat.shape)
     cost = float(np.where(length <= HUBER, squared, 2 * HUBER * length - HUBER**2).sum())
+    weights = np.zeros(len(used))
+    weights[used] = weight
     return Solution(
         camera=camera,
         residual=residual,
         slopes=slopes,
         noise=noise,
+        weight=weights,
         normal=flat.T @ tall,
         right=tall.T @ gap.reshape(-1),
         cost=cost,
@@ -144,31 +148,73 @@ def squares(solution: Solution) -> Array:
     return np.einsum("ni,nij,nj->n", solution.residual, np.linalg.inv(solution.noise), solution.residual)
 
 
-def scatter_of(solution: Solution, problem: Problem, used: Mask) -> float:
-    """Residuals of the used pairs in units of the stated errors; NaN without redundancy."""
-    redundancy = 2 * int(used.sum()) - problem.unknowns
-    return float(np.sqrt(squares(solution)[used].sum() / redundancy)) if redundancy > 0 else float("nan")
+@dataclass(frozen=True, eq=False)
+class Deletion:
+    """What each pair looks like to the others: n pairs as if each had been left out, the others kept as they are.
+
+    A pair that is not used is seen by all that are. All from one solution, linearised (Belsley, Kuh and Welsch 1980);
+    with Huber's weights, since a pair that weighs less pulls the camera less, too.
+
+    Attributes
+    ----------
+    residual : (n, 2) of the pair against what the others predict [px]; NaN where they do not determine the camera, or
+        it has no pixel.
+    expected : (n, 2, 2) its covariance as the errors are stated [px²].
+    spread : (n, p, p) covariance of the parameters without the pair; infinite where nothing but it determines them.
+    moved : (n, p) by how much the parameters move without it; 0 for pairs that are not used.
+    """
+
+    residual: Array
+    expected: Array
+    spread: Array
+    moved: Array
+
+    @property
+    def squared(self) -> Array:
+        """(n,) squared residuals in units of their covariance; NaN where nothing checks the pair."""
+        good = _all_finite(self.residual) & _all_finite(self.expected)
+        found = np.full(len(good), np.nan)
+        if good.any():
+            solved = np.linalg.solve(self.expected[good], self.residual[good][:, :, None])[..., 0]
+            found[good] = np.einsum("ni,ni->n", self.residual[good], solved)
+        return found
 
 
-def spread_of(solution: Solution, problem: Problem, used: Mask) -> tuple[float, Array]:
-    """The scatter, and the covariance of the parameters that goes with it."""
-    scatter = scatter_of(solution, problem, used)
-    larger = max(1.0, scatter**2) if np.isfinite(scatter) else 1.0
-    return scatter, inverse(solution.normal) * larger
+def without_each(solution: Solution) -> Deletion:
+    """Each pair against the others."""
+    slopes, noise = solution.slopes, solution.noise
+    seen = _all_finite(slopes) & _all_finite(solution.residual)
+    known = np.where(seen[:, None, None], slopes, 0.0)
+    gap = np.where(seen[:, None], solution.residual, np.nan)
+    pull = np.swapaxes(known, 1, 2) @ np.linalg.inv(noise) * solution.weight[:, None, None]
+    spread = inverse(solution.normal - pull @ known)
+    with np.errstate(invalid="ignore"):
+        moved = -(spread @ (pull @ np.nan_to_num(gap)[:, :, None]))[..., 0]
+        moved[solution.weight == 0] = 0.0
+        return Deletion(
+            residual=gap - (known @ moved[:, :, None])[..., 0],
+            expected=noise + known @ spread @ np.swapaxes(known, 1, 2),
+            spread=spread,
+            moved=moved,
+        )
 
 
-def sigma_without(solution: Solution, problem: Problem, used: Mask) -> Array:
+def sigma_without(deletion: Deletion, used: Mask) -> Array:
     """(n,) standard deviation of the position in its worst direction without each used pair [m]; 0 for the others.
 
-    Infinite where nothing but the pair determines it; as the errors are stated, like `inverse(solution.normal)`.
+    Infinite where nothing but the pair determines it; as the errors are stated.
     """
-    trust, sigma = np.linalg.inv(solution.noise), np.zeros(len(used))
-    for i in np.flatnonzero(used):
-        slope = solution.slopes[i]
-        spread = inverse(solution.normal - slope.T @ trust[i] @ slope)[3:6, 3:6]
-        known = np.isfinite(spread).all()
-        sigma[i] = np.sqrt(max(np.linalg.eigvalsh(spread)[-1], 0.0)) if known else np.inf
+    place = deletion.spread[:, 3:6, 3:6]
+    known = _all_finite(place)
+    sigma = np.where(used, np.inf, 0.0)
+    values = np.linalg.eigvalsh(place[known])[:, -1]
+    sigma[known] = np.where(used[known], np.sqrt(np.maximum(values, 0.0)), 0.0)
     return sigma
+
+
+def _all_finite(values: Array) -> Mask:
+    """(n,) which of n arrays have finite numbers only."""
+    return np.asarray(np.isfinite(values).reshape(len(values), -1).all(axis=1), dtype=np.bool_)
 
 
 def moved_with(solution: Solution, problem: Problem, used: Mask, pair: int) -> float:

@@ -37,7 +37,10 @@ class Geometry:
     other : a different camera that fits nearly as well, or None.
     wrong : names and residuals [px] of the pairs that were left out, and by how much the camera's position moves with
         them [m], NaN where they have no pixel.
-    relied_on : name of the pair without which the position is known worst, and its standard deviation then [m].
+    asked : names of pairs that are used and should be looked at again, their residuals, and what these are without the
+        pair [px], and by how much the camera's position moves without it [m].
+    relied_on : name of the pair without which the position is known worst, its standard deviation then, and with the
+        pair [m], as far as the clicks go.
     """
 
     camera: Camera
@@ -51,7 +54,8 @@ class Geometry:
     rmse_px: float
     other: Camera | None
     wrong: tuple[tuple[str, float, float], ...]
-    relied_on: tuple[str, float]
+    asked: tuple[tuple[str, float, float, float], ...]
+    relied_on: tuple[str, float, float]
 
     def sigma(self, name: str) -> float:
         i = self.parameters.index(name)
@@ -69,6 +73,7 @@ def remarks_on(found: Geometry) -> tuple[Remark, ...]:
     """The gravest first; none when all is well."""
     return (
         *_on_wrong_pairs(found),
+        *_on_pairs_to_look_at(found),
         *_on_a_rival(found),
         *_on_focal_length(found),
         *_on_position(found),
@@ -85,6 +90,17 @@ def _on_wrong_pairs(found: Geometry) -> Iterator[Remark]:
         moved = f"; with it the camera would stand {shift:.2g} m from here" if shift > found.sigma_position_m else ""
         off = f"({_pixels(residual)} off) and was left out{moved}. Check its pixel and its point."
         yield Remark(f"Pair {name} does not fit the others {off}", "warning", about_pair(name))
+
+
+def _on_pairs_to_look_at(found: Geometry) -> Iterator[Remark]:
+    for name, residual, alone, moved in found.asked:
+        if moved > found.sigma_position_m / 2 or not np.isfinite(moved):
+            where = f"which would stand {moved:.2g} m away without it" if np.isfinite(moved) else "and on it alone"
+            text = f"Look at pair {name} again: the camera hangs on it, {where}."
+        else:
+            text = f"Look at pair {name} again: it may be wrong."
+        text += f" It is used, and {_pixels(residual)} off; the others alone put it {_pixels(alone)} off."
+        yield Remark(f"{text} If it is right, a pair near it will confirm it.", "warning", about_pair(name))
 
 
 def about_pair(name: str) -> str:
@@ -168,13 +184,14 @@ def _on_position(found: Geometry) -> Iterator[Remark]:
 
 
 def _on_the_pair_relied_on(found: Geometry) -> Iterator[Remark]:
-    name, alone = found.relied_on
-    if found.redundancy <= FEW or not alone > RELIES * found.sigma_position_m:
+    name, alone, together = found.relied_on
+    asked = name in {one for one, *_ in found.asked}
+    if asked or found.redundancy <= FEW or not alone > RELIES * together:
         return
     known = f"to {alone:.2g} m" if np.isfinite(alone) else "not at all"
     text = (
         f"The camera rests on pair {name}: without it the position is known {known}, with it to "
-        f"{found.sigma_position_m:.2g} m, and the others hardly check it. Add one near it."
+        f"{together:.2g} m, and the others hardly check it. Add one near it."
     )
     yield Remark(text, "advice", about_pair(name))
 

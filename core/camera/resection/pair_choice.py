@@ -2,18 +2,22 @@
 """Which pairs are believed, and the camera that fits them.
 
 A pair is called wrong by its residual against what the others predict (Baarda 1968, with a variance that is estimated
-together with the stated one).
+together with the stated one). One that decides the camera is left out only when there is no doubt: the others tell
+little of where it should be, and a good one that is lost costs more than a wrong one that a person is asked about.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
 from ...errors import RockfallError
-from ...least_squares import inverse
 from ...vectors import Array, Mask, norm
 from ..model import Camera
-from .adjustment import Solution, adjusted, adjusted_from, is_settled, scatter_of, squares
+from .adjustment import Solution, adjusted, adjusted_from, is_settled, squares, without_each
+from .assumed_lens import assumed_lens
 from .problem import Problem
 from .starting import Starts, mirrored
+from .uncertainty import scatter_of
 
 ADJUSTED = 3
 """From how many of the starts the least squares begin."""
@@ -37,6 +41,11 @@ PRIOR_FREEDOM = 6.0
 
 FALSE_ALARM = 0.002
 """Chance that a sound set of pairs loses one."""
+
+DECIDES = 0.5
+"""A pair that takes up more than this part of its own error decides the camera, which then fits it, right or wrong."""
+BEYOND_DOUBT = 2.0
+"""Such a pair is left out from so many times the limit on only; before that a person is asked."""
 
 TRUSTED_SCATTER = 3.0
 """Up to this many times the stated errors, all pairs are believed unless one stands out."""
@@ -148,9 +157,10 @@ def _snooped(problem: Problem, solution: Solution, used: Mask) -> tuple[Solution
     """Pairs leave that the others contradict, the worst first, and return when they are believed again."""
     tried = {used.tobytes()}
     for _ in range(2 * len(used)):
-        suspicion = _suspicion(problem, solution, used)
+        suspicion, decides = _suspicion(problem, solution, used)
         changed = used.copy()
-        leaving, returning = np.where(used, suspicion, -np.inf), np.where(used, np.inf, suspicion)
+        limit = np.where(decides, BEYOND_DOUBT, 1.0)
+        leaving, returning = np.where(used, suspicion / limit, -np.inf), np.where(used, np.inf, suspicion)
         if leaving.max() > 1 and _may_lose_one(problem, used) and used.sum() > 4:
             changed[np.argmax(leaving)] = False
         elif returning.min() < 1:
@@ -165,30 +175,26 @@ def _snooped(problem: Problem, solution: Solution, used: Mask) -> tuple[Solution
     return solution, used
 
 
-def _suspicion(problem: Problem, solution: Solution, used: Mask) -> Array:
-    """(n,) each pair's squared residual against what the others predict, over the limit for a wrong pair.
+def _suspicion(problem: Problem, solution: Solution, used: Mask) -> tuple[Array, Mask]:
+    """(n,) each pair's squared residual against what the others predict, over the limit for a wrong pair; and whether
+    it decides the camera.
 
     The variance is that of the others, together with the stated one as if `PRIOR_FREEDOM` observations had shown it,
     and no less than the stated one.
     """
     from scipy.special import fdtri
 
-    spread = inverse(solution.normal)
-    around = solution.slopes @ spread @ np.swapaxes(solution.slopes, 1, 2)
-    expected = solution.noise + np.where(used, -1.0, 1.0)[:, None, None] * around
-    suspicion = np.where(used, 0.0, np.inf)
-    total = float(squares(solution)[used].sum())
-    freedom = 2 * int(used.sum()) - problem.unknowns + PRIOR_FREEDOM
-    for i in range(len(used)):
-        shares = np.linalg.eigvalsh(expected[i] / solution.noise[i, 0, 0]) if np.isfinite(expected[i]).all() else [0.0]
-        if shares[0] < 1e-6:
-            continue  # nothing checks this pair, or it has no pixel
-        squared = float(solution.residual[i] @ np.linalg.solve(expected[i], solution.residual[i]))
-        rest = max(total - squared, 0.0) if used[i] else total
-        others = freedom - 2 if used[i] else freedom
-        limit = 2 * fdtri(2, others, 1 - FALSE_ALARM / len(used))
-        suspicion[i] = squared / max(1.0, (PRIOR_FREEDOM + rest) / others) / limit
-    return suspicion
+    deletion = without_each(solution)
+    deletion = replace(deletion, expected=deletion.expected + assumed_lens(solution, problem, used).noise)
+    squared, own = deletion.squared, squares(solution)
+    total = float(own[used].sum())
+    others = 2 * int(used.sum()) - problem.unknowns + PRIOR_FREEDOM - 2.0 * used
+    rest = np.maximum(total - np.where(used, np.maximum(squared, own), 0.0), 0.0)
+    limit = 2 * fdtri(2, others, 1 - FALSE_ALARM / len(used))
+    suspicion = squared / np.maximum(1.0, (PRIOR_FREEDOM + rest) / others) / limit
+    with np.errstate(invalid="ignore"):
+        decides = used & (norm(solution.residual) < (1 - DECIDES) * norm(deletion.residual))
+    return np.where(np.isnan(suspicion), np.where(used, 0.0, np.inf), suspicion), decides
 
 
 def _may_lose_one(problem: Problem, used: Mask) -> bool:

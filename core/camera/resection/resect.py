@@ -16,14 +16,13 @@ from ...least_squares import inverse
 from ...remarks import Remark
 from ...vectors import Array, Mask, distance_to_ray, norm
 from ..model import SIGMA_PX, Camera, rays
-from .adjustment import Solution, moved_with, sigma_without, spread_of
+from ..quality import POSE, CameraQuality
+from .adjustment import Solution, moved_with, sigma_without, without_each
 from .advice import Geometry, remarks_on
 from .pair_choice import choose, choose_near
 from .problem import Problem, basis_of, check_number, checked_pairs, free_columns, starting_camera
 from .starting import find_starts
-
-POSE = ("rx", "ry", "rz", "x", "y", "z")
-"""The pose's parameters: turns about the camera's own axes [rad], and the position [m]."""
+from .uncertainty import confidence, worst_sigma
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +37,16 @@ class Resection:
     used : (n,) False for pairs that were left out as wrong.
     rmse_px : root of the mean squared length of the residuals of the used pairs [px].
     parameters : (p,) names in the order of the covariance: `POSE`, then what was free of the lens.
-    covariance : (p, p) [rad, m, px, 1]; infinite when the pairs do not determine the parameters.
-    scatter : residuals in units of the stated errors, 1 when they agree; NaN without redundancy. Above 1 the
-        covariance is enlarged by its square.
+    covariance : (p, p) [rad, m, px, 1], with what few pairs cannot show (`uncertainty`): 1.96 standard deviations
+        hold 95 %; infinite when the pairs do not determine the parameters.
+    scatter : residuals in units of the stated errors, 1 when they agree; NaN without redundancy.
     redundancy : observations more than unknowns.
     remarks : what a user should know, the gravest first.
     wrong : names of the pairs left out, or their numbers from 1.
+    asked : names of pairs that are used, and that a person should look at again: the camera hangs on them.
+    by_lens : (p, p) part of the covariance that comes from what was assumed of the lens.
+    doubt : (n,) probability that a pair is wrong, of what the others say.
+    whole : (15, 15) covariance of pose and lens together, as in `CameraQuality`; None where it is infinite.
     """
 
     camera: Camera
@@ -57,6 +60,10 @@ class Resection:
     redundancy: int
     remarks: tuple[Remark, ...]
     wrong: tuple[str, ...]
+    asked: tuple[str, ...]
+    by_lens: Array
+    doubt: Array
+    whole: Array | None
 
     @property
     def sigma(self) -> dict[str, float]:
@@ -77,11 +84,17 @@ class Resection:
 
         With `pose_covariance` it could back away as if the focal length grew along.
         """
-        pose, lens = self.covariance[:6, :6], self.covariance[6:, 6:]
-        both = self.covariance[:6, 6:]
+        covariance = self.covariance - self.by_lens
+        pose, lens, both = covariance[:6, :6], covariance[6:, 6:], covariance[:6, 6:]
         if not lens.size or np.isinf(pose).any():
             return pose
         return pose - both @ inverse(lens, partly=True) @ both.T
+
+    @property
+    def quality(self) -> CameraQuality:
+        """What the camera rests on."""
+        worst = worst_sigma(self.covariance[3:6, 3:6])
+        return CameraQuality(int(self.used.sum()), self.redundancy, self.wrong, self.asked, worst, self.whole)
 
     def correlation(self, first: str, second: str) -> float:
         """Correlation of two parameters, −1…1; NaN when they are not determined."""
@@ -144,20 +157,21 @@ def resect(
         (solution, used), other = near, None
     else:
         solution, other, used = _searched(start, problem, columns, robust, with_pose=camera is not None)
-    scatter, covariance = spread_of(solution, problem, used)
+    known = confidence(solution, problem, used, other, robust=robust)
     residual_m = distance_to_ray(problem.points, *rays(solution.camera, problem.pixels))
     depth = (problem.points - solution.camera.position) @ solution.camera.rotation[2]
     rmse = float(np.sqrt(np.mean(np.einsum("ni,ni->n", solution.residual, solution.residual)[used])))
     redundancy = 2 * int(used.sum()) - problem.unknowns
-    alone = sigma_without(solution, problem, used) * max(1.0, scatter if np.isfinite(scatter) else 1.0)
+    deletion = without_each(solution)
+    alone = sigma_without(deletion, used) * known.factor
     geometry = Geometry(
         camera=solution.camera,
         pixels=problem.pixels[used],
         points=problem.points[used],
         depth=depth[used],
         parameters=(*POSE, *columns),
-        covariance=covariance,
-        scatter=scatter,
+        covariance=known.covariance,
+        scatter=known.scatter,
         redundancy=redundancy,
         rmse_px=rmse,
         other=other.camera if other is not None else None,
@@ -165,7 +179,11 @@ def resect(
             (named[i], float(norm(solution.residual[i])), moved_with(solution, problem, used, i))
             for i in np.flatnonzero(~used).tolist()
         ),
-        relied_on=(named[int(np.argmax(alone))], float(alone.max())),
+        asked=tuple(
+            (named[i], float(norm(solution.residual[i])), float(norm(deletion.residual[i])), float(known.moved_m[i]))
+            for i in np.flatnonzero(known.asked).tolist()
+        ),
+        relied_on=(named[int(np.argmax(alone))], float(alone.max()), worst_sigma(known.own[3:6, 3:6])),
     )
     return Resection(
         camera=solution.camera,
@@ -174,11 +192,15 @@ def resect(
         used=used,
         rmse_px=rmse,
         parameters=(*POSE, *columns),
-        covariance=covariance,
-        scatter=scatter,
+        covariance=known.covariance,
+        scatter=known.scatter,
         redundancy=redundancy,
         remarks=remarks_on(geometry),
         wrong=tuple(name for name, *_ in geometry.wrong),
+        asked=tuple(name for name, *_ in geometry.asked),
+        by_lens=known.by_lens,
+        doubt=known.doubt,
+        whole=known.whole if np.isfinite(known.whole).all() else None,
     )
 
 

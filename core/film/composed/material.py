@@ -12,7 +12,7 @@ from ...analysis.comparison import compare
 from ...analysis.predicted_flights import PredictedFlights, fly_predictions
 from ...errors import InputError
 from ...exchange.footage import UNREFINED, clock_of, measured_in, open_entry
-from ...exchange.opening import blocks_of, open_terrain, read_project_camera
+from ...exchange.opening import blocks_of, camera_remarks, open_terrain, read_project_camera
 from ...exchange.project import Project, VideoEntry, read_project
 from ...impact_models.registry import COMPARED, find_model
 from ...progress import Progress, silent
@@ -234,6 +234,7 @@ def open_material(request: FilmRequest, progress: Progress = silent) -> Material
     result = measured_in(project, surface)
     unrefined = any(remark.text == UNREFINED for remark in result.remarks)
     remarks = [UNREFINED] if unrefined else []
+    remarks += map(str, camera_remarks(project))
     words = texts(request.language).measured_roughly() if unrefined else texts(request.language)
     footage = _footage(project, surface, request.video, progress)
     known = list(dict.fromkeys(result.picks.trajectory.tolist()))

@@ -28,6 +28,8 @@ class View:
         is not known. The time of a frame is that of its middle row.
     pose_covariance : (6, 6) of the solved pose, rotation vector [rad] about the axes of the camera in the solved frame
         and position [m]; an error of the solved pose moves and turns the whole path. None when unknown.
+    camera_covariance : (15, 15) of the solved pose and the lens together, as `CameraQuality` has it: for rays through
+        pixels, of which the pose for a lens that is held tells too little. None when unknown.
     """
 
     name: str
@@ -35,6 +37,7 @@ class View:
     clock: Clock = field(default_factory=Clock)
     row_time_s: float | None = 0.0
     pose_covariance: Array | None = None
+    camera_covariance: Array | None = None
 
     def __post_init__(self) -> None:
         if self.pose_covariance is None:
@@ -68,11 +71,21 @@ class View:
         video_s : video time of the picture [s].
         distance_m : from the camera to what is seen.
         """
-        path = self.path
-        turn = np.eye(6)
+        return self._in_picture(self.solved_covariance(distance_m), video_s)
+
+    def ray_covariance_at(self, video_s: float, distance_m: float) -> Array:
+        """As `covariance_at`; (15, 15) with the lens where it is known together with the pose."""
+        known = self.camera_covariance
+        return self.covariance_at(video_s, distance_m) if known is None else self._in_picture(known, video_s)
+
+    def _in_picture(self, solved: Array, video_s: float) -> Array:
+        path, size = self.path, len(solved)
+        turn = np.eye(size)
         turn[:3, :3] = path.poses_at([video_s])[1][0] @ path.reference.rotation.T
         own = [np.interp(video_s, path.time_s, each) for each in (path.sigma_rotation, path.sigma_position_m)]
-        return turn @ self.solved_covariance(distance_m) @ turn.T + np.diag(np.repeat(np.square(own), 3))
+        moved = np.zeros(size)
+        moved[:6] = np.repeat(np.square(own), 3)
+        return turn @ solved @ turn.T + np.diag(moved)
 
     def in_shift(self, shift: GlobalShift) -> "View":
         """The same view in the local frame of another shift."""

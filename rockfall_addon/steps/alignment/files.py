@@ -102,7 +102,14 @@ def import_camera(scene: bpy.types.Scene, camera: bpy.types.Object, path: str | 
         georeference.write_shift(scene, one.shift)
     if not file.path.is_fixed and settings.motion == "FIXED":
         settings.motion = "ROTATION"
-    camera_paths.set_camera_path(scene, camera, file.path, rmse_px=file.rmse_px, pose_covariance=file.pose_covariance)
+    camera_paths.set_camera_path(
+        scene,
+        camera,
+        file.path,
+        rmse_px=file.rmse_px,
+        pose_covariance=file.pose_covariance,
+        quality=file.quality,
+    )
     camera[store.PLACED] = alignment.FROM_FILE
     solving.check(scene, camera, alignment.Solution(rmse_px=_number(file.rmse_px), sigma=dict(file.sigma)))
 
@@ -122,6 +129,7 @@ def export_camera(scene: bpy.types.Scene, camera: bpy.types.Object, file: str | 
     beside = RESIDUALS if file.stem == "camera" else f"{file.stem}_{RESIDUALS}"
     with output_folder(file.parent) as folder:
         known = {"rmse_px": solution.rmse_px, "sigma": solution.sigma, "pose_covariance": covariance}
+        known["quality"] = camera_paths.quality_of(camera)
         write_camera(folder / file.name, path, **known)
         if complete:
             table = pairs.table(complete, georeference.read_shift(scene))

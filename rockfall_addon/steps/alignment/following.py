@@ -78,6 +78,7 @@ def apply(scene: bpy.types.Scene, camera: bpy.types.Object, solved: SolvedFrames
         found.path,
         rmse_px=camera.get(store.RMSE),
         pose_covariance=camera_paths.pose_covariance(camera),
+        quality=camera_paths.quality_of(camera),
     )
     camera[store.FOLLOWED] = json.dumps(
         {

@@ -19,7 +19,7 @@ from .solving import fill_rows, solve
 ALIGNED = (
     store.PAIRS, store.OPEN_PAIR, store.SOLUTION, store.KNOWN_LENS, store.PLACED, store.FOLLOWED, store.SOLVED,
     store.CAMERA, store.REFERENCE_POSE, store.POSE_TIMES, store.POSES, store.POSE_SIGMA, store.CAMERA_SHIFT,
-    store.RMSE, store.POSE_COVARIANCE, store.ASPECT,
+    store.RMSE, store.POSE_COVARIANCE, store.ASPECT, store.CAMERA_QUALITY,
 )  # fmt: skip
 """What is kept of an alignment."""
 LENS = ("type", "sensor_fit", "lens_unit", "sensor_width", "sensor_height", "lens", "shift_x", "shift_y")

@@ -37,6 +37,7 @@ def solve(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:
         _path(camera, aligned.solved),
         rmse_px=aligned.found.rmse_px,
         pose_covariance=aligned.pose_covariance,
+        quality=aligned.found.quality,
     )
     solution = Solution(
         rmse_px=aligned.found.rmse_px,

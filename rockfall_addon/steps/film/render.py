@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 
 from ....core.errors import InputError, RockfallError
+from ....core.exchange.opening import camera_remarks
 from ....core.exchange.project import Project, RenderPreset, read_project
 from ....core.film.check import check_film, check_picture
 from ....core.film.engines import MEASURED
@@ -17,7 +18,7 @@ from ....core.progress import Progress
 from ....core.reconstruction.trajectory import Reconstruction
 from ....core.simulation.measured_releases import start_times
 from ....core.workflow.simulation import remarks_of
-from ...scene import models, simulation
+from ...scene import models, problems, simulation
 from ...scene.project import load_project
 from . import dressing, encoding, saved
 from .engine import engine_of, use_engine
@@ -40,16 +41,18 @@ def make(job: FilmJob, progress: Progress) -> tuple[str, ...]:
         return _compose(job, progress)
     if job.source.suffix.lower() == BLEND:
         scene = saved.open_film(job)
+        remarks = tuple(map(str, problems.of_cameras(scene)))
     elif job.kind == "terrain":
         _show_terrain(scene, job)
     else:
         project = read_project(job.source)
         preset = find_preset(project, job.preset)
         result = _load(scene, job.source, preset)
+        remarks = tuple(map(str, camera_remarks(project)))
         if job.models:
             models.show_models(scene, result, job.models, job.parameters)
         if job.simulate:
-            remarks = _simulate(scene, job, project, result, progress)
+            remarks = (*remarks, *_simulate(scene, job, project, result, progress))
         if job.kind == "slope":
             dressing.set_up_picture(scene, preset, job.engine)
         else:

@@ -125,7 +125,7 @@ def _take_off(tree, facets, stack, p, v, n, m, place, j, t, radius, gravity, wid
 
 @kernel
 def keeps(facets, corners, i, j, v, n, m, radius, gravity, hop):  # type: ignore[no-untyped-def]
-    """Whether a block stays on the ground that falls away from triangle i to j, as the surface that they are samples of.
+    """Whether a block stays on ground that falls away from triangle i to j, as the surface that they are samples of.
 
     It does where gravity bends its path as much as the surface is curved, v² ≤ g cosβ (R + r), and where the crease
     that is left between both sends it no higher than a hop.
@@ -153,8 +153,10 @@ def turns_about(tree, facets, i, e, v, radius, gravity):  # type: ignore[no-unty
     m = upward(corners, i)
     if dot(e, m) > 1.0 - 1e-9:
         return True
-    share = 1.0 if min(min(facets[0][i, 0], facets[0][i, 1]), facets[0][i, 2]) < 0 else share_of_crease(
-        facets, corners, i, i, v, m
+    share = (
+        1.0
+        if min(min(facets[0][i, 0], facets[0][i, 1]), facets[0][i, 2]) < 0
+        else share_of_crease(facets, corners, i, i, v, m)
     )
     return share * share * dot(v, v) <= gravity * max(e[2], 0.0) * radius
 

@@ -64,7 +64,9 @@ def test_a_good_surface_has_no_faults() -> None:
     assert (faults.triangles, faults.border_edges) == (800, 80)
     assert (faults.twice, faults.opposed_edges, faults.branching_edges, faults.spikes) == (0, 0, 0, 0)
     said = texts(fall(make_ground(sheet())))
-    assert not any(what in text for text in said for what in ("Triangles", "triangles of", "Edges between", "Edges of", "Spikes"))
+    assert not any(
+        what in text for text in said for what in ("Triangles", "triangles of", "Edges between", "Edges of", "Spikes")
+    )
 
 
 def test_triangles_without_area_are_left_out() -> None:

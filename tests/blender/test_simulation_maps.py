@@ -50,7 +50,8 @@ def test_the_maps_are_those_of_the_core(mapped: bpy.types.Scene, part) -> None:
     column, row = np.floor((simulation.releases.position[:, :2] - [cells.x0_m, cells.y0_m]) / 4.0).astype(int).T
     assert (maps.layers["Nr_blocks"][row, column] > 0).all()
     fastest = np.nanmax(maps.layers["V_max"])
-    assert fastest == pytest.approx(simulation.v_max_mps.max(), rel=1e-6)
+    # A short step that ends at a corner is drawn as a parabola, which is a little faster than its ends.
+    assert fastest == pytest.approx(simulation.v_max_mps.max(), rel=1e-3)
     assert "Maps of 150 blocks with Noël et al. 2017" in said(part, mapped)
 
 

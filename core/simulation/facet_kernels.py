@@ -4,13 +4,13 @@
 It is kept in a tuple `facets` of five, in the order of the leaves: the triangle across each edge (m, 3), from corner
 e to e + 1, −1 where a block is not taken over it; the bend there (m, 3), tan(θ/2) of the angle θ by which the ground
 rises beyond, negative where it falls; what a sphere is clear of (m, 4), which is looked up when a block is first on
-the triangle; and how the bend θ is divided: the curvature (m, 3) [1/m] of the surface of which the triangles are
-samples, and the crease (m, 3) [rad] that this surface has at the edge.
+the triangle; the curvature (m, 3) [1/m] of the surface of which the triangles are samples, xx, xy and yy of a quadratic
+form in the horizontal parts of a direction; and the crease (m, 3) [rad], the part of each bend that is a sharp edge.
 
-A smooth surface bends between its samples as well: from the corner opposite the edge on one side to the one on the
-other, the normals at the corners (means over the triangles around) turn by 2 θ. At a crease between two planes they
-turn by θ, all at the edge. What they turn beyond θ, no less than 0 and no more than θ, belongs to the curved surface;
-the rest of θ is the crease.
+An edge is a crease as far as it bends more than the mesh around does. The normals of the corners opposite the edge
+(means over the triangles around) lean by a and b from those of their triangles: by θ/2 each on a sampled arc, by
+nothing at an edge between two planes. So the crease is √(θ² − 4 (a² + b²)), or 0; of a crest `SLIGHT` to `DISTINCT`, a
+part of it. The rest of the bend is curvature.
 
 What a sphere is clear of is
 
@@ -93,7 +93,7 @@ def _tilt(normals, v, out, n):  # type: ignore[no-untyped-def]
 
 @kernel
 def link(corners, face, neighbours, place, faces, normals, across, bend, curvature, crease):  # type: ignore[no-untyped-def]
-    """Fill `across`, `bend`, `curvature` and `crease`.
+    """Fill `across`, `bend`, `crease`, and the curvature across each edge: see `curve`.
 
     Parameters
     ----------
@@ -144,14 +144,14 @@ def curve(corners, across, edge_curvature, curvature):  # type: ignore[no-untype
     """Fill `curvature` from that at the edges.
 
     The curvatures at a triangle's three edges, each across its edge, add up to that of the surface: exactly for a
-    quadratic one that is sampled on a grid. The mean with those of the triangles around is taken.
+    quadratic one that is sampled on a grid. The mean with those of the triangles around is taken. A wall has none.
     """
     for i in range(len(corners)):
         n = upward(corners, i)
         xx = xy = yy = 0.0
         for e in range(3):
             k = edge_curvature[i, e]
-            if k != 0.0:
+            if k != 0.0 and n[2] > LEVEL:
                 along = minus(corner(corners, i, (e + 1) % 3), corner(corners, i, e))
                 out, size = cross(along, n), dot(along, along)
                 x, y = out[0] - out[2] * n[0] / n[2], out[1] - out[2] * n[1] / n[2]

@@ -56,6 +56,12 @@ def met(v, n, m, inertia, part):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def beyond_noise(turn, noise):  # type: ignore[no-untyped-def]
+    """Which part of a turn [rad] is none of a noise: √(1 − (noise/turn)²), or 0."""
+    return sqrt(1.0 - (noise / turn) ** 2) if turn > noise else 0.0
+
+
+@kernel
 def _have_a_corner_in_common(corners, i, j):  # type: ignore[no-untyped-def]
     for k in range(3):
         for e in range(3):
@@ -65,16 +71,16 @@ def _have_a_corner_in_common(corners, i, j):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def share_of_crease(facets, corners, i, j, v, n):  # type: ignore[no-untyped-def]
+def share_of_crease(facets, corners, i, j, v, n, turn):  # type: ignore[no-untyped-def]
     """Which part of a turn of the normal from triangle i to j is a crease of the surface, 0 to 1.
 
     It is that of the edge between both; where they have a corner in common alone, of the edges of triangle i that v
-    crosses; and 1 where they have none: the contact has jumped over what is between.
+    crosses. Where they have none, the contact has jumped over what is between: all but the noise of the bends there.
     """
-    across, bend, _, _, crease = facets
+    across, bend, _, curvature, crease = facets
     bends = creases = 0.0
     if not _have_a_corner_in_common(corners, i, j):
-        return 1.0
+        return beyond_noise(turn, curvature[i, 3])
     for e in range(3):
         if bend[i, e] == 0.0:
             continue

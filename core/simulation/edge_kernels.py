@@ -14,7 +14,7 @@ import numpy as np
 
 from ..compiled import borrowing as kernel
 from .contact_kernels import first_root
-from .corner_kernels import met, share_of_crease
+from .corner_kernels import angle_between, met, share_of_crease
 from .facet_kernels import GENTLE, NOWHERE, convexity, corner, dot, is_clear, minus, upward
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE
 
@@ -89,7 +89,7 @@ def onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, inerti
     if j < 0 or facets[1][place, edge] > GENTLE:
         return v, n, place, AT_ANOTHER
     m = upward(tree[3], j)
-    share = share_of_crease(facets, tree[3], place, j, v, n)
+    share = share_of_crease(facets, tree[3], place, j, v, n, angle_between(n, m))
     turned = met(v, n, m, inertia, share * share)
     speed = sqrt(dot(turned, turned))
     if speed == 0.0 or not _within(tree, facets, j, p, m, radius, place):
@@ -138,7 +138,7 @@ def keeps(facets, corners, i, j, v, n, m, radius, gravity, hop):  # type: ignore
     bends = 0.5 * (convexity(facets, i, v) + convexity(facets, j, v))
     if bends * (square - pull * radius) > pull * square:
         return False
-    crossing = dot(v, m) * share_of_crease(facets, corners, i, j, v, n)
+    crossing = dot(v, m) * share_of_crease(facets, corners, i, j, v, n, angle_between(n, m))
     return crossing * crossing <= 2.0 * pull * hop
 
 
@@ -156,7 +156,7 @@ def turns_about(tree, facets, i, e, v, radius, gravity):  # type: ignore[no-unty
     share = (
         1.0
         if min(min(facets[0][i, 0], facets[0][i, 1]), facets[0][i, 2]) < 0
-        else share_of_crease(facets, corners, i, i, v, m)
+        else share_of_crease(facets, corners, i, i, v, m, 0.0)
     )
     return share * share * dot(v, v) <= gravity * max(e[2], 0.0) * radius
 

@@ -28,7 +28,7 @@ from ..compiled import borrowing, kernel
 from ..terrain.kernels import STACK_SIZE
 from .chance_kernels import ATTITUDE, fill_uniform
 from .contact_kernels import TOUCHING_M, inlined, last_root
-from .corner_kernels import FREE, FUZZY, angle_between, met, share_of_crease, share_of_wall
+from .corner_kernels import FREE, FUZZY, angle_between, beyond_noise, met, share_of_crease, share_of_wall
 from .drag_kernels import DRAG_CHANGE, with_drag
 from .edge_kernels import keeps, onto, over, turns_about
 from .facet_kernels import NOWHERE
@@ -464,9 +464,9 @@ def run_block(  # type: ignore[no-untyped-def]
             if meets:
                 share = 1.0
                 if len(tree) == 6:
-                    share = share_of_crease(facets, tree[3], place, other, v, n)
+                    share = share_of_crease(facets, tree[3], place, other, v, n, angle)
                 else:
-                    share = sqrt(max(1.0 - (FUZZY / angle) ** 2, 0.0))
+                    share = beyond_noise(angle, FUZZY)
                 after, wall = met(v, n, against, rolls, share * share), share_of_wall(angle)
                 if wall > 0.0 and towards * towards > 2.0 * gravity * HOP * radius:
                     fill_uniform(seed, run, impacts, draws)
@@ -587,13 +587,14 @@ def run_block(  # type: ignore[no-untyped-def]
 
 @kernel
 def run_blocks(  # type: ignore[no-untyped-def]
-    tree, facets, zone, rebound, parameters, friction, own, draw_count, among, runs, seed, place, velocity, spin,
+    tree, facets, scale, zone, rebound, parameters, friction, own, draw_count, among, runs, seed, place, velocity, spin,
     radius, mass, inertia, moments, drag, gravity, law, most_impacts, most_s, record, stems, results, rows,
 ):  # fmt: skip
     """Simulate n blocks, `own` (n,) their sets; returns their records, in `rows` or in a longer array, and how many.
 
     Parameters
     ----------
+    facets : see `facet_kernels`, with curvature and crease of k scales; scale : (n,) which of them is each block's.
     among : (n,) the place of each, which its records have; runs : (n,) its number.
     results : (n, 7) to be filled: end, time, impacts, length, v_max, hits of trees, records.
     """
@@ -604,9 +605,10 @@ def run_blocks(  # type: ignore[no-untyped-def]
     uniform = np.empty(3)
     for i in range(len(runs)):
         first, end = count, NO_ROOM
+        about = facets[0], facets[1], facets[2], facets[3][scale[i]], facets[4][scale[i]]
         while end == NO_ROOM:  # with longer records it begins again: to make them there costs all of it each turn
             count, end, time, impacts, length, v_max, trees = run_block(
-                tree, facets, zone, rebound, parameters, friction, own[i], draws, stack, times, nearby, close, rows,
+                tree, about, zone, rebound, parameters, friction, own[i], draws, stack, times, nearby, close, rows,
                 first, runs[i], seed, (place[i, 0], place[i, 1], place[i, 2]),
                 (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
                 (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i],

@@ -143,6 +143,15 @@ def keeps(facets, corners, i, j, v, n, m, radius, gravity, hop):  # type: ignore
 
 
 @kernel
+def _on_surface(facets, corners, i, j, v, n, m):  # type: ignore[no-untyped-def]
+    """A velocity along triangle i, at the edge to j: along the surface that both are samples of, half of the bend on."""
+    part = 0.5 * (1.0 - share_of_crease(facets, corners, i, j, v, n, angle_between(n, m))) * dot(v, m)
+    way = (v[0] - part * m[0], v[1] - part * m[1], v[2] - part * m[2])
+    s = sqrt(dot(v, v) / dot(way, way))
+    return s * way[0], s * way[1], s * way[2]
+
+
+@kernel
 def turns_about(tree, facets, i, e, v, radius, gravity):  # type: ignore[no-untyped-def]
     """Whether a block turns about the edge or corner of triangle i that it touches, with the normal e of the contact.
 
@@ -182,12 +191,13 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu,
     if j < 0 or bend[place, edge] < -GENTLE or dot(v, v) == 0.0:
         return 0.0, p, v, n, -1
     m = upward(corners, j)
+    stays = keeps(facets, corners, place, j, v, n, m, radius, gravity, hop)
+    if not stays:
+        v = _on_surface(facets, corners, place, j, v, n, m)
     cosine, rises, fall = dot(m, n), dot(v, m), gravity * m[2]
     height = radius * (cosine - 1.0)
     square = rises * rises + 2.0 * fall * height
-    if keeps(facets, corners, place, j, v, n, m, radius, gravity, hop) or (
-        square <= 0.0 or rises + sqrt(square) <= fall * shortest
-    ):
+    if stays or square <= 0.0 or rises + sqrt(square) <= fall * shortest:
         contact = (p[0] - radius * n[0], p[1] - radius * n[1], p[2] - radius * n[2])
         wide = radius + hop
         if not (

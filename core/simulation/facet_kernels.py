@@ -216,6 +216,19 @@ def convexity(facets, i, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def surface_normal(facets, corners, i, q, n):  # type: ignore[no-untyped-def]
+    """The normal at a place q over triangle i of the surface that it is a sample of; n is the triangle's own."""
+    h = facets[3]
+    x = q[0] - (corners[i, 0, 0] + corners[i, 1, 0] + corners[i, 2, 0]) / 3.0
+    y = q[1] - (corners[i, 0, 1] + corners[i, 1, 1] + corners[i, 2, 1]) / 3.0
+    a, b = h[i, 0] * x + h[i, 1] * y, h[i, 1] * x + h[i, 2] * y
+    s = a * n[0] + b * n[1]
+    m = (n[0] - a + s * n[0], n[1] - b + s * n[1], n[2] + s * n[2])
+    size = sqrt(dot(m, m))
+    return m[0] / size, m[1] / size, m[2] / size
+
+
+@kernel
 def _greatest_cosine(w, a, b):  # type: ignore[no-untyped-def]
     """Between a direction and those from one to another."""
     m = cross(a, b)

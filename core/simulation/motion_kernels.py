@@ -31,7 +31,7 @@ from .contact_kernels import TOUCHING_M, inlined, last_root
 from .corner_kernels import FREE, FUZZY, angle_between, beyond_noise, met, share_of_crease, share_of_wall
 from .drag_kernels import DRAG_CHANGE, with_drag
 from .edge_kernels import keeps, onto, over, turns_about
-from .facet_kernels import NOWHERE
+from .facet_kernels import NOWHERE, surface_normal
 from .ground_kernels import box, first_contact
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE, leg
 from .near_kernels import MOST_NEAR, NEIGHBOURHOOD, closest_near, first_near, inside
@@ -396,6 +396,7 @@ def run_block(  # type: ignore[no-untyped-def]
                     tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, HOP * radius, dt
                 )
                 moves, leaves, edge = hit >= 0, hit < 0 and t > 0.0, ON_TRIANGLE
+                v = turned if leaves else v
         if not moves:
             dt = t if leaves else dt
             free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
@@ -419,6 +420,8 @@ def run_block(  # type: ignore[no-untyped-def]
                     t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)
                     q, turned = _at(free, falling, (0.0, 0.0, -gravity), t if hit >= 0 else 0.0)
                     t, lands = t + dt, _dot(turned, e)
+                    if hit >= 0 and len(tree) == 6:
+                        lands = _dot(turned, surface_normal(facets, tree[3], hit, q, e))
                     moves = hit >= 0 and e[2] > 0.0 and lands * lands < 2.0 * gravity * e[2] * HOP * radius
                 if not moves:
                     grounded, known, at_once = False, drag == 0.0, 0

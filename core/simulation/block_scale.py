@@ -9,8 +9,8 @@ those of noise do not. With A, the size of the sum, and B, the sum of the sizes,
   `NOISE`, alone from `SURFACE` on;
 - `NOISY` (B − A), as a mean over the edges, is the noise, which no crease may be part of.
 
-Where edges are as long as the block, 2 r, or longer, nothing is known of a smaller scale, and the bends of the mesh are
-taken for those of the surface.
+This holds where edges are shorter than the diameter. Where they are twice as long or more, nothing is known of the
+scale of the block, and the bends of the mesh are taken for those of the surface; between, in part.
 """
 
 from typing import Any
@@ -77,9 +77,9 @@ def at_scale(corners: Any, linked: tuple[Any, Any, Any, Any], radius_m: float) -
     measure(corners, bend, width, sums)
     area = sums[:, 0]
     noise, coherent, mean = np.zeros(m), np.ones(m), np.zeros((m, 3))
-    spacing = float(np.sqrt(2.0 * np.median(area)))
+    spacing = float(np.sqrt(2.0 * np.median(area))) if m else np.inf
     around = None
-    if m and spacing < 4.0 * radius_m:
+    if spacing < 4.0 * radius_m:
         around = Around(np.asarray(corners, dtype=np.float64).mean(axis=1)[:, :2], radius_m, spacing)
         all_area = np.maximum(around(area), 1e-12)
         local = np.sqrt(2.0 * all_area / np.maximum(around(np.ones(m)), 1e-12))

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What lies about each triangle, for a block that rolls or slides on it: compiled kernels.
 
-It is kept in a tuple `facets` of five, in the order of the leaves: the triangle across each edge (m, 3), from corner
-e to e + 1, −1 where a block is not taken over it; the bend there (m, 3), tan(θ/2) of the angle θ by which the ground
-rises beyond, negative where it falls; what a sphere is clear of (m, 4), which is looked up when a block is first on
-the triangle; the curvature (m, 4) [1/m] of the surface of which the triangles are samples, xx, xy and yy of a quadratic
-form in the horizontal parts of a direction, and the noise of the bends around [rad]; and the crease (m, 3) [rad], the
-part of each bend that is a sharp edge.
-The last two are those of the surface at the scale of the block: see `block_scale`.
+It is kept in a tuple `facets` of six, in the order of the leaves:
+
+- the triangle across each edge (m, 3), from corner e to e + 1, −1 where a block is not taken over it;
+- the bend there (m, 3), tan(θ/2) of the angle θ by which the ground rises beyond, negative where it falls;
+- what a sphere is clear of (m, 4), which is looked up when a block is first on the triangle;
+- the curvature (m, 4) [1/m] of the surface of which the triangles are samples, xx, xy and yy of a quadratic form in the
+  horizontal parts of a direction, and the noise of the bends around [rad];
+- the crease (m, 3) [rad], the part of each bend that is a sharp edge;
+- the lean (m, 3), how much of each bend the surface has turned at the edge itself, by the mean normals of its ends.
+
+Curvature and crease are those of the surface at the scale of the block: see `block_scale`.
 
 An edge is a crease as far as it bends more than the mesh around does. The normals of the corners opposite the edge
 (means over the triangles around) lean by a and b from those of their triangles: by θ/2 each on a sampled arc, by
@@ -94,8 +98,8 @@ def _tilt(normals, v, out, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def link(corners, face, neighbours, place, faces, normals, across, bend, excess, width):  # type: ignore[no-untyped-def]
-    """Fill `across`, `bend`, and what creases and curvature follow from.
+def link(corners, face, neighbours, place, faces, normals, across, bend, lean, excess, width):  # type: ignore[no-untyped-def]
+    """Fill `across`, `bend`, `lean`, and what creases and curvature follow from.
 
     Parameters
     ----------
@@ -107,7 +111,7 @@ def link(corners, face, neighbours, place, faces, normals, across, bend, excess,
     for i in range(len(corners)):
         n = upward(corners, i)
         for e in range(3):
-            across[i, e], bend[i, e], excess[i, e], width[i, e] = -1, 0.0, 0.0, 0.0
+            across[i, e], bend[i, e], lean[i, e], excess[i, e], width[i, e] = -1, 0.0, 0.0, 0.0, 0.0
             other = neighbours[face[i], e]
             if other < 0:
                 continue
@@ -128,6 +132,8 @@ def link(corners, face, neighbours, place, faces, normals, across, bend, excess,
             whole = sqrt(rise * rise + run * run)
             bend[i, e] = rise / (whole + run) if whole + run > 1e-6 * whole else 1e6
             turn = bend_angle(bend[i, e])
+            ends = _tilt(normals, faces[face[i], e], out, n) + _tilt(normals, faces[face[i], (e + 1) % 3], out, n)
+            lean[i, e] = min(max(-0.5 * ends / turn, 0.0), 1.0) if turn != 0.0 else 0.0
             before = _tilt(normals, faces[face[i], (e + 2) % 3], out, n)
             beyond = _tilt(normals, faces[other, apex], out, n)
             excess[i, e] = turn * turn - 4.0 * (before * before + (turn + beyond) * (turn + beyond))
@@ -213,19 +219,6 @@ def convexity(facets, i, v):  # type: ignore[no-untyped-def]
     """How much the surface about triangle i bends down along v: its curvature [1/m] times |v|²."""
     h = facets[3]
     return max(-(h[i, 0] * v[0] * v[0] + 2.0 * h[i, 1] * v[0] * v[1] + h[i, 2] * v[1] * v[1]), 0.0)
-
-
-@kernel
-def surface_normal(facets, corners, i, q, n):  # type: ignore[no-untyped-def]
-    """The normal at a place q over triangle i of the surface that it is a sample of; n is the triangle's own."""
-    h = facets[3]
-    x = q[0] - (corners[i, 0, 0] + corners[i, 1, 0] + corners[i, 2, 0]) / 3.0
-    y = q[1] - (corners[i, 0, 1] + corners[i, 1, 1] + corners[i, 2, 1]) / 3.0
-    a, b = h[i, 0] * x + h[i, 1] * y, h[i, 1] * x + h[i, 2] * y
-    s = a * n[0] + b * n[1]
-    m = (n[0] - a + s * n[0], n[1] - b + s * n[1], n[2] + s * n[2])
-    size = sqrt(dot(m, m))
-    return m[0] / size, m[1] / size, m[2] / size
 
 
 @kernel

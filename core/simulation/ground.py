@@ -153,15 +153,16 @@ class Ground:
 
     @cached_property
     def facets(self) -> Any:
-        """What lies about each triangle, for blocks that roll, whatever their size: `across`, `bend` and `clear` of
-        `facet_kernels`; empty with points."""
-        across, bend = self._linked()[:2]
-        return across, bend, np.zeros((len(across), 4), np.float32)
+        """What lies about each triangle, for blocks that roll, whatever their size: `across`, `bend`, `clear` and
+        `lean` of `facet_kernels`; empty with points."""
+        across, bend, lean = self._linked()[:3]
+        return across, bend, np.zeros((len(across), 4), np.float32), lean
 
-    def _linked(self) -> tuple[Any, Any, Any, Any]:
+    def _linked(self) -> tuple[Any, Any, Any, Any, Any]:
         """See `facet_kernels.link`."""
         m = 0 if len(self.points) else len(self.faces)
-        across, (bend, excess, width) = np.empty((m, 3), np.int32), (np.empty((m, 3), np.float32) for _ in range(3))
+        across = np.empty((m, 3), np.int32)
+        bend, lean, excess, width = (np.empty((m, 3), np.float32) for _ in range(4))
         if m:
             from ..terrain.kernels import edge_neighbours
             from .facet_kernels import link
@@ -171,23 +172,24 @@ class Ground:
             place[face] = np.arange(m, dtype=np.int32)
             neighbours = edge_neighbours(self.faces, len(self.vertices))
             normals = self._vertex_normals
-            link(self.index.corners, face, neighbours, place, self.faces, normals, across, bend, excess, width)
-        return across, bend, excess, width
+            link(self.index.corners, face, neighbours, place, self.faces, normals, across, bend, lean, excess, width)
+        return across, bend, lean, excess, width
 
     def facets_at(self, octaves: Iterable[int]) -> Any:
-        """`facets`, and behind them `curvature` and `crease` (k, m, 3) of the surface at the scales of blocks.
+        """What kernels take of k sizes of blocks: curvature (k, m, 4) and crease (k, m, 3) between those of `facets`.
 
         octaves : k numbers, see `block_scale.octave`.
         """
         wanted = tuple(octaves)
         found = self._at_octaves.get(wanted)
         if found is None:
-            linked, corners = self._linked(), self.index.corners if len(self.facets[0]) else np.empty((0, 3, 3))
-            both = [at_scale(corners, linked, 2.0**one) for one in wanted]
+            across, bend, _, excess, width = self._linked()
+            corners = self.index.corners if len(across) else np.empty((0, 3, 3))
+            both = [at_scale(corners, (across, bend, excess, width), 2.0**one) for one in wanted]
             found = np.stack([one for one, _ in both]), np.stack([one for _, one in both])
             self._at_octaves.clear()  # one at a time: they are as large as the terrain
             self._at_octaves[wanted] = found
-        return *self.facets, *found
+        return *self.facets[:3], *found, self.facets[3]
 
     @cached_property
     def _at_octaves(self) -> dict[tuple[int, ...], tuple[Any, Any]]:

@@ -28,10 +28,10 @@ from ..compiled import borrowing, kernel
 from ..terrain.kernels import STACK_SIZE
 from .chance_kernels import ATTITUDE, fill_uniform
 from .contact_kernels import TOUCHING_M, inlined, last_root
-from .corner_kernels import FREE, FUZZY, angle_between, beyond_noise, met, share_of_crease, share_of_wall
+from .corner_kernels import FREE, FUZZY, angle_between, between, beyond_noise, met, share_of_crease, share_of_wall
 from .drag_kernels import DRAG_CHANGE, with_drag
 from .edge_kernels import keeps, onto, over, turns_about
-from .facet_kernels import NOWHERE, surface_normal
+from .facet_kernels import NOWHERE
 from .ground_kernels import box, first_contact
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE, leg
 from .near_kernels import MOST_NEAR, NEIGHBOURHOOD, closest_near, first_near, inside
@@ -393,10 +393,11 @@ def run_block(  # type: ignore[no-untyped-def]
                     q = _touching(tree, stack, q, turned, radius, nearby, close, n)[0]
             elif edge != AT_ANOTHER:
                 t, q, turned, e, hit = over(
-                    tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, HOP * radius, dt
+                    tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, HOP * radius
                 )
                 moves, leaves, edge = hit >= 0, hit < 0 and t > 0.0, ON_TRIANGLE
-                v = turned if leaves else v
+                if leaves:
+                    p, v = q, turned
         if not moves:
             dt = t if leaves else dt
             free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
@@ -420,8 +421,6 @@ def run_block(  # type: ignore[no-untyped-def]
                     t, e, hit = _lands(tree, stack, times, nearby, free, falling, gravity, radius)
                     q, turned = _at(free, falling, (0.0, 0.0, -gravity), t if hit >= 0 else 0.0)
                     t, lands = t + dt, _dot(turned, e)
-                    if hit >= 0 and len(tree) == 6:
-                        lands = _dot(turned, surface_normal(facets, tree[3], hit, q, e))
                     moves = hit >= 0 and e[2] > 0.0 and lands * lands < 2.0 * gravity * e[2] * HOP * radius
                 if not moves:
                     grounded, known, at_once = False, drag == 0.0, 0
@@ -475,11 +474,7 @@ def run_block(  # type: ignore[no-untyped-def]
                     fill_uniform(seed, run, impacts, draws)
                     v1, w1 = v, w
                     v, w = rebound(v1, against, w1, radius, mass, parameters[own + zone[other]], draws)
-                    v = (
-                        after[0] + wall * (v[0] - after[0]),
-                        after[1] + wall * (v[1] - after[1]),
-                        after[2] + wall * (v[2] - after[2]),
-                    )
+                    v, w = between(after, v, wall), between(_rolling(against, after, radius), w, wall)
                     impacts += 1
                     if record >= IMPACTS:
                         write(rows, count, run, IMPACT, time, p, v, w, v1, w1, against, other)
@@ -608,7 +603,7 @@ def run_blocks(  # type: ignore[no-untyped-def]
     uniform = np.empty(3)
     for i in range(len(runs)):
         first, end = count, NO_ROOM
-        about = facets[0], facets[1], facets[2], facets[3][scale[i]], facets[4][scale[i]]
+        about = facets[0], facets[1], facets[2], facets[3][scale[i]], facets[4][scale[i]], facets[5]
         while end == NO_ROOM:  # with longer records it begins again: to make them there costs all of it each turn
             count, end, time, impacts, length, v_max, trees = run_block(
                 tree, about, zone, rebound, parameters, friction, own[i], draws, stack, times, nearby, close, rows,

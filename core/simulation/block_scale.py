@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The surface at the scale of a block: how far bends of a mesh are those of a surface, and how far noise.
 
-A sphere that rolls feels what is as large as itself. Where edges are shorter, their bends are summed with a normal law
-of the standard deviation of its radius around each triangle, as its sign says: on a crest or in a hollow they add up,
-those of noise do not. With A, the size of the sum, and B, the sum of the sizes,
+A sphere that rolls feels what is as large as itself. Where edges are shorter, the bends around each triangle are summed
+with the weights of a normal law, as wide as `WIDE` of the radius. On a crest or in a hollow they add up, those of noise
+do not. With A, the size of the sum, and B, the sum of the sizes,
 
 - A/B says how far the curvature of the triangles themselves counts, beside the mean curvature around: not at all up to
   `NOISE`, alone from `SURFACE` on;
@@ -19,9 +19,11 @@ import numpy as np
 
 from ..vectors import Array
 
+WIDE = 0.6
+"""Standard deviation of what is around, as a part of the radius."""
 SMALL = 0.003
 """A mean bend [rad] that is no noise."""
-NOISE, SURFACE = 0.3, 0.8
+NOISE, SURFACE = 0.2, 0.5
 """The sum of the bends around as a part of the sum of their sizes."""
 NOISY = 3.0
 """So many times its mean size, noise of a normal law is in 98 of 100 cases smaller."""
@@ -29,9 +31,9 @@ FINEST = 8
 """So many cells a triangle, at most."""
 
 
-def octave(radius_m: Array) -> Array:
-    """(n,) integers: the powers of 2 m that stand for radii. A block's does not depend on other blocks."""
-    return np.asarray(np.rint(np.log2(radius_m)).astype(np.int64))
+def step_of(radius_m: Array) -> Array:
+    """(n,) integers: the powers of √2 m that stand for radii. A block's does not depend on other blocks."""
+    return np.asarray(np.rint(2.0 * np.log2(radius_m)).astype(np.int64))
 
 
 class Around:
@@ -80,7 +82,7 @@ def at_scale(corners: Any, linked: tuple[Any, Any, Any, Any], radius_m: float) -
     spacing = float(np.sqrt(2.0 * np.median(area))) if m else np.inf
     around = None
     if spacing < 4.0 * radius_m:
-        around = Around(np.asarray(corners, dtype=np.float64).mean(axis=1)[:, :2], radius_m, spacing)
+        around = Around(np.asarray(corners, dtype=np.float64).mean(axis=1)[:, :2], WIDE * radius_m, spacing)
         all_area = np.maximum(around(area), 1e-12)
         local = np.sqrt(2.0 * all_area / np.maximum(around(np.ones(m)), 1e-12))
         smaller = np.clip(4.0 * radius_m / local - 1.0, 0.0, 1.0)

@@ -23,7 +23,7 @@ from ..plausibility import GREATEST_SEED
 from ..progress import Progress, silent
 from ..reconstruction.drag import Drag
 from ..vectors import Array, Indices, Mask
-from .block_scale import octave
+from .block_scale import step_of
 from .ground import Ground
 from .memory import check_records
 from .parameter_draws import FRICTION_NAME, ParameterDraws, check_draws
@@ -262,7 +262,7 @@ def simulate(
     from .record_kernels import COLUMNS, in_turn
 
     progress("Compiling where needed, then simulating", 0, n)
-    scales, scale = np.unique(octave(releases.radius_m), return_inverse=True)
+    scales, scale = np.unique(step_of(releases.radius_m), return_inverse=True)
     facets, stems = ground.facets_at(scales.tolist()), in_cells(settings.trees)
     run_blocks = _compiled_runs(tree, facets, stems)
     columns = (

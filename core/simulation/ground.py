@@ -175,24 +175,24 @@ class Ground:
             link(self.index.corners, face, neighbours, place, self.faces, normals, across, bend, lean, excess, width)
         return across, bend, lean, excess, width
 
-    def facets_at(self, octaves: Iterable[int]) -> Any:
+    def facets_at(self, steps: Iterable[int]) -> Any:
         """What kernels take of k sizes of blocks: curvature (k, m, 4) and crease (k, m, 3) between those of `facets`.
 
-        octaves : k numbers, see `block_scale.octave`.
+        steps : k numbers, see `block_scale.step_of`.
         """
-        wanted = tuple(octaves)
-        found = self._at_octaves.get(wanted)
+        wanted = tuple(steps)
+        found = self._at_steps.get(wanted)
         if found is None:
             across, bend, _, excess, width = self._linked()
             corners = self.index.corners if len(across) else np.empty((0, 3, 3))
-            both = [at_scale(corners, (across, bend, excess, width), 2.0**one) for one in wanted]
+            both = [at_scale(corners, (across, bend, excess, width), 2.0 ** (0.5 * one)) for one in wanted]
             found = np.stack([one for one, _ in both]), np.stack([one for _, one in both])
-            self._at_octaves.clear()  # one at a time: they are as large as the terrain
-            self._at_octaves[wanted] = found
+            self._at_steps.clear()  # one at a time: they are as large as the terrain
+            self._at_steps[wanted] = found
         return *self.facets[:3], *found, self.facets[3]
 
     @cached_property
-    def _at_octaves(self) -> dict[tuple[int, ...], tuple[Any, Any]]:
+    def _at_steps(self) -> dict[tuple[int, ...], tuple[Any, Any]]:
         return {}
 
     @property

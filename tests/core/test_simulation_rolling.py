@@ -170,7 +170,7 @@ def noisy_plane(sigma: float) -> Surface:
     )
 
 
-@pytest.mark.parametrize(("diameter", "sigma"), [(0.3, 0.005), (1.0, 0.01)])
+@pytest.mark.parametrize(("diameter", "sigma"), [(0.3, 0.003), (1.0, 0.01)])
 def test_noise_of_a_scan_below_the_scale_of_the_block_is_no_friction(diameter: float, sigma: float) -> None:
     """The stop is that of the energy line: drop/μ, though noel_2017 takes most of the speed at each impact."""
     ground, friction = make_ground(noisy_plane(sigma)), 0.35

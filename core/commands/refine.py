@@ -16,12 +16,12 @@ from .options import add_out, known_names, naming, not_negative, positive
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
-    from ..exchange.footage import Footage
     from ..exchange.project import Project, RefinementSettings
     from ..reconstruction.impact import Impacts
     from ..reconstruction.picks import Picks
     from ..reconstruction.refinement.what_if import WhatIf
     from ..terrain.surface import Surface
+    from ..workflow.footage import Footage
     from ..workflow.refinement import Refined
 
 MOST_ROWS = 20
@@ -71,10 +71,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Refine, write the tables and the refined project, print the summary."""
-    from ..exchange.footage import name_trajectory, open_footage
-    from ..exchange.opening import blocks_of, drag_of, open_terrain
     from ..exchange.project import read_project
     from ..output import output_folder
+    from ..workflow.footage import name_trajectory, open_footage
+    from ..workflow.opening import blocks_of, drag_of, open_terrain
     from ..workflow.refinement import refine_picks
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.project):
@@ -119,9 +119,9 @@ def _settings(settings: "RefinementSettings", arguments: argparse.Namespace) -> 
 
 def _picks(project: "Project", surface: "Surface | None", footage: "Footage") -> tuple["Picks", tuple[str, ...]]:
     """The project's picks, or first ones from what was seen; with a sentence about these."""
-    from ..exchange.footage import picks_from_footage
-    from ..exchange.opening import read_project_picks
     from ..exchange.tables import read_picks
+    from ..workflow.footage import picks_from_footage
+    from ..workflow.opening import read_project_picks
 
     if project.picks is not None:
         if surface is None:

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from refinement import CAMERA, SIGMA_TRACK, TERRAIN, Case, film
+from refinement import CAMERA, TERRAIN, Case, film
 from rn_intervals import GIVEN_STEP_M, TRUE_STEP_M, Slope, make_slope, truth_of
 from rockfall.core.reconstruction.picks import Picks
 from rockfall.core.reconstruction.refinement.refine import PixelObservations, Refinement, View, refine

@@ -149,6 +149,7 @@ def set_up(
     gravity_mps2: float,
     free: frozenset[str],
     sigma_aim: float = 0.0,
+    sigma_datum: float = 0.0,
 ) -> Setup:
     """The joint problem of some trajectories.
 
@@ -216,6 +217,7 @@ def set_up(
             ground.normals.normal[nodes[on_ground]],
             ground.sigma_m[nodes[on_ground]],
             ground.sigma_terrain_m,
+            sigma_datum * _reach_m(views, seen, centre.mean(axis=0)),
         ),
         surface=ground.surface,
         pass_segment=passes[0],
@@ -261,6 +263,16 @@ def _whitening(views: tuple[View, ...], middle: Array) -> Array:
         covariance = view.solved_covariance(float(norm(middle - view.path.reference.position)))
         result[i] = np.linalg.inv(np.linalg.cholesky(covariance))
     return result
+
+
+def _reach_m(views: tuple[View, ...], seen: PixelObservations, middle: Array) -> float:
+    """Distance from the cameras [m]: of such parts of each, which are of no other's, what their mean is off.
+
+    What is taken for a view without a covariance holds this error already.
+    """
+    used = [views[i] for i in np.unique(seen.view)]
+    away = [float(norm(middle - one.path.reference.position)) for one in used if one.pose_covariance is not None]
+    return float(np.sqrt(np.square(away).sum())) / max(len(used), 1)
 
 
 def _frame_s(views: tuple[View, ...], seen: PixelObservations) -> float:

@@ -95,7 +95,7 @@ def _on_terrain(ground: Ground, fits: Sequence[Fit]) -> Iterator[Remark]:
     if not touching:
         return
     errors = [fit.setup.problem.ground for fit in touching]
-    scale = float(np.median([np.median(one.sigma_m / one.scaled(1.0, 1.0).sigma_m) for one in errors]))
+    scale = float(np.median([np.median(one.own_sigma_m / one.scaled(1.0, 1.0).own_sigma_m) for one in errors]))
     off = 100 * float(np.median([np.median(one.own_sigma_m) for one in errors]))
     accuracy = 100 * ground.sigma_terrain_m
     stated = "stated" if ground.terrain_stated else "taken by its point spacing"

@@ -49,6 +49,13 @@ class GroundErrors:
         """(g,) the same without what the cameras do to it [m]."""
         return np.sqrt(self.sigma_m**2 - np.diag(self.datum))
 
+    @property
+    def tilting_scale(self) -> float:
+        """Factor on the terrain's accuracy where what contacts are off by beyond their own is the terrain's: errors
+        that differ from contact to contact may be waves of it, which tilt it."""
+        beyond = self.own_sigma_m**2 - np.minimum(self.contact_scale, 1.0) ** 2 * self.contact_m**2
+        return float(np.sqrt(np.mean(beyond / np.diag(self.terrain)))) if self.contact_m.size else 1.0
+
     def with_contact(self, contact_m: Array) -> "GroundErrors":
         """With other standard deviations of what differs from contact to contact, (g,) [m]."""
         return replace(self, contact_m=contact_m).scaled(self.contact_scale, self.terrain_scale)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...least_squares import inverse
 from ...remarks import Remark
-from ...vectors import Array, Indices, norm, unit
+from ...vectors import Array, Indices, dot, norm, unit
 from .deviations import Fit, velocity_rows
 from .problem import NODE, Problem, evaluate, ground_distances
 from .solver import normal_equations
@@ -270,10 +270,11 @@ def _errors(fit: Fit, problem: Problem) -> Iterator[_Errors]:
     if told.size:
         place = problem.views[0].path.reference.position
         ray = unit(state.centre[told] - place)
-        weight = problem.sigma_centre_m[told] ** -2.0
+        white = problem.centre_whitening[told]
+        by = np.einsum("nij,nj->ni", np.swapaxes(white, 1, 2) @ white, ray)
         mixed = np.zeros((told.size, size))
         for axis in range(3):
-            mixed[np.arange(told.size), NODE * told + axis] = -weight * ray[:, axis]
-        away = np.einsum("ni,ni->n", (state.centre - problem.centre)[told], ray)
+            mixed[np.arange(told.size), NODE * told + axis] = -by[:, axis]
+        away, weight = dot((state.centre - problem.centre)[told], by), dot(by, ray)
         words = [f"Mark of the {called(node)} farther away" for node in told]
-        yield _Errors([PLACE] * told.size, words, owner[told], "m", -weight * away, weight, mixed)
+        yield _Errors([PLACE] * told.size, words, owner[told], "m", -away, weight, mixed)

@@ -213,7 +213,7 @@ def _with_sigmas(
             axis=1,
         )
         covariance[mine] = slope @ fit.covariance @ np.swapaxes(slope, 1, 2)
-        accuracy = problem.ground.terrain_scale * np.nan_to_num(sigma_terrain_m)
+        accuracy = problem.ground.tilting_scale * np.nan_to_num(sigma_terrain_m)
         tilt[mine] = np.hypot(tilt[mine], terrain_tilt(accuracy, 2 * normals.radius_m[own[mine]]))
     given = np.isnan(impacts.normal_spread)
     spread = np.where(given, normals.spread[own], impacts.normal_spread)

@@ -96,8 +96,8 @@ def run(arguments: argparse.Namespace) -> int:
     from ..exchange.opening import read_project_picks, reconstruct_project
     from ..exchange.partial_factors import USUAL, open_factors
     from ..exchange.project import read_project
+    from ..exchange.scenarios import open_simulation
     from ..exchange.screens import write_screens
-    from ..exchange.simulation_project import open_simulation
     from ..output import output_folder
     from ..workflow.design_sheet import design_sheet
     from ..workflow.enough import as_many_as

@@ -4,8 +4,8 @@
 from dataclasses import replace
 
 from ..exchange.project import Project
+from ..exchange.scenarios import open_simulation
 from ..exchange.simulation_entry import ReleaseEntry
-from ..exchange.simulation_project import open_simulation
 from ..progress import Progress, silent
 from ..simulation.engine import Simulation
 from ..workflow.simulation import run_scenario

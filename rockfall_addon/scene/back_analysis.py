@@ -16,8 +16,8 @@ from ...core.analysis.sections import Section
 from ...core.errors import RockfallError
 from ...core.exchange.job_inputs import input_hashes
 from ...core.exchange.opening import reconstruct_project
+from ...core.exchange.scenarios import placed_source
 from ...core.exchange.simulation_entry import TABLE, ReleaseEntry, SimulationEntry
-from ...core.exchange.simulation_project import placed_source
 from ...core.exchange.tables import read_picks
 from ...core.exchange.whole_run_tables import stopped_runs
 from ...core.impact_models.registry import MODELS, find_model

@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 
 from ...core.errors import RockfallError
+from ...core.exchange.scenarios import measured_source, placed_source
 from ...core.exchange.simulation_entry import MEASURED, STEEP, ReleaseEntry, SimulationEntry
-from ...core.exchange.simulation_project import measured_source, placed_source
 from ...core.reconstruction.picks import take
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark

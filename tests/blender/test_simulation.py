@@ -419,3 +419,41 @@ def test_a_seed_that_blender_cannot_hold_is_said(scan: bpy.types.Scene, part) ->
     assert scan.rockfall_simulation.seed == 5
     assert sources.keep_entry(scan, entry(seed=2**31 - 1)) == ""
     assert scan.rockfall_simulation.seed == 2**31 - 1
+
+
+def test_the_mesh_is_checked_where_that_is_asked_for(drawn: bpy.types.Scene, part) -> None:
+    def of_mesh() -> list[str]:
+        assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+        found = part("rockfall_addon.scene.simulation_setup").remarks(drawn)
+        return [one.text for one in found if "divided" in one.text]
+
+    assert not of_mesh()
+    drawn.rockfall_simulation.check_mesh = True
+    plan = part("rockfall_addon.scene.simulation_setup").plan(drawn)
+    ground = part("core.workflow.simulation").ground_of(plan.scenario)
+    check = part("core.workflow.mesh_check")
+    changes = check.mesh_changes(plan.scenario, ground, plan.scenario.releases(ground))
+    assert {one.model for one in changes} == MODELS
+    assert set(of_mesh()) == {one.text for one in check.change_remarks(changes)}
+    drawn.rockfall_simulation.contact = "points"
+    assert not part("rockfall_addon.scene.simulation_setup").plan(drawn).check_mesh, "points have no mesh"
+
+
+@pytest.mark.parametrize(("contact", "diameter"), [("mesh", 0.5), ("points", 12.0)])
+def test_the_exported_project_is_the_same_scenario(scan: bpy.types.Scene, part, tmp_path, contact, diameter) -> None:
+    settings = scan.rockfall_simulation
+    settings.source, settings.steeper_than_deg, settings.number, settings.seed = "STEEP", 33.0, 6, 5
+    settings.contact, settings.diameter_m, settings.models = contact, diameter, MODELS
+    settings.trees, settings.stems_per_hectare = "DRAWN", 200.0
+    scan.rockfall_parameters.noel_2017.rt = 0.41
+    shown = exact(part, scan)
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
+    file = tmp_path / "out" / "project.toml"
+    project = part("core.exchange.project").read_project(file)
+    scenario, _ = part("core.exchange.scenarios").open_simulation(project, file)
+    stated = {one.settings.model: one for one in part("core.workflow.simulation").run_scenario(scenario)}
+    assert stated.keys() == shown.keys() == MODELS
+    for model, one in stated.items():
+        assert len(one) == len(shown[model]) == 6
+        np.testing.assert_array_equal(one.position, shown[model].position)
+        np.testing.assert_array_equal(one.settings.trees.position, shown[model].settings.trees.position)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from rockfall.core.errors import InputError
 from rockfall.core.exchange.project import BlockEntry
+from rockfall.core.exchange.scenarios import placed_source
 from rockfall.core.exchange.simulation_entry import ReleaseEntry, SimulationEntry, TreesEntry
-from rockfall.core.exchange.simulation_project import placed_source
 from rockfall.core.exchange.trees import open_trees
 from rockfall.core.exchange.zones import read_zones
 from rockfall.core.georeference import GlobalShift

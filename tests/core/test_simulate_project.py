@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rockfall.core.cli import main
 from rockfall.core.exchange.project import read_project
-from rockfall.core.exchange.simulation_project import open_simulation
+from rockfall.core.exchange.scenarios import open_simulation
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.impact_models.registry import COMPARED
 from rockfall.core.reconstruction.drag import Drag

@@ -20,7 +20,7 @@ MATTERS = 1.2
 """A cause that makes deviations larger by this factor is spoken of."""
 EXACT = 1e-3
 """Of the terrain's accuracy, for what the deviations would be without it."""
-WRONG = 2.0
+WRONG = 1.5
 """A terrain that is off by so many times what was stated is."""
 GRAVITY_OFF, GRAVITY_SIGNIFICANCE = 0.1, 5.0
 """Gravity that is off by more than this part, and by more than so many standard deviations, is no gravity."""

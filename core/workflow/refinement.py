@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..progress import Progress, silent
 from ..reconstruction.block import Block
-from ..reconstruction.choices import SIGMA_AIM, Loss
+from ..reconstruction.choices import SIGMA_AIM, SIGMA_DATUM, Loss
 from ..reconstruction.drag import Drag
 from ..reconstruction.picks import Picks, take
 from ..reconstruction.refinement.refine import refine
@@ -77,6 +77,7 @@ def refine_picks(
     free: Sequence[str] = (),
     sigma_terrain_m: float | None = None,
     sigma_aim: float = SIGMA_AIM,
+    sigma_datum: float = SIGMA_DATUM,
     loss: Loss = "huber",
     site: str = "",
     progress: Progress = silent,
@@ -115,6 +116,7 @@ def refine_picks(
         free=[name for name in free if clocked or not name.startswith("clock")],
         sigma_terrain_m=sigma_terrain_m,
         sigma_aim=sigma_aim,
+        sigma_datum=sigma_datum,
         loss=loss,
         site=site,
         progress=progress,

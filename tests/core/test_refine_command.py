@@ -180,7 +180,8 @@ def test_refined_picks_and_impacts_are_those_that_were_filmed(site, tmp_path, ca
     out = tmp_path / "runs" / "out"
     assert main(["refine", str(site / "project.toml"), "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    names = {"picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv", "what_if.csv", "project.toml"}
+    names = {"picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv", "project.toml"}
+    names |= {"what_if.csv", "reliability.csv"}
     assert {path.name for path in out.iterdir()} == names
     check_picks(out)
     before = read_picks(site / "picks.csv", SHIFT)

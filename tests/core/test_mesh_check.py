@@ -85,7 +85,7 @@ def test_the_ratio_is_always_said_and_warned_of_where_the_ground_is_curved(spaci
     assert found.diameter_m == pytest.approx(0.3)
     assert f"edges of {found.edge_m / 0.3:.2g} diameters" in remark.text
     assert remark.severity == ("warning" if coarse else "note")
-    assert ("--check-mesh" in remark.text) == coarse
+    assert ("Check the mesh" in remark.text) == coarse
 
 
 def test_points_have_no_mesh() -> None:

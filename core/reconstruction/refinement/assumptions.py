@@ -39,9 +39,11 @@ def _on_gravity(fits: Sequence[Fit]) -> Iterator[Remark]:
     found = [_gravity_of(fit) for fit in fits]
     weight = np.array([sigma**-2 for _, sigma in found])
     value, sigma = float(weight @ [one for one, _ in found] / weight.sum()), float(weight.sum() ** -0.5)
-    rates = [1 + float(fault.value[0]) for fit in fits for fault in fit.faults if fault.kind == "rate"]
+    rates = [fault for fit in fits for fault in fit.faults if fault.kind == "rate"]
     if rates:
-        value, sigma = GRAVITY_MPS2 * float(np.median(rates)) ** 2, max(sigma, 1e-9)
+        longer = 1 + float(np.median([fault.value[0] for fault in rates]))
+        value = GRAVITY_MPS2 * longer**2
+        sigma = 2 * GRAVITY_MPS2 * longer * float(np.median([fault.sigma[0] for fault in rates]))
     off = abs(value - GRAVITY_MPS2)
     wrong = off > GRAVITY_OFF * GRAVITY_MPS2 and off > GRAVITY_SIGNIFICANCE * sigma
     if value > 0 and (rates or wrong):

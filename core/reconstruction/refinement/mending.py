@@ -192,9 +192,12 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
     faults = list[Fault]()
     for _ in range(MOST):
         linear = _linear(found.problem, found.solution, found.noise)
+        stated = _as_stated(found, loss)
         ahead = list[_Trial]()
         for group in candidates(found.problem, found.solution.state):
-            best = max(_tried(linear, group), key=lambda one: one.evidence)
+            on_ground = group[0].kind == "ground" and stated is not found
+            about = _linear(stated.problem, stated.solution, stated.noise) if on_ground else linear
+            best = max(_tried(about, group), key=lambda one: one.evidence)
             if best.fault.kind == "gap":
                 near = [g for g in gaps(found.problem, best.fault.view, best.fault.at) if g.picks == best.fault.picks]
                 best = max(_tried(linear, near, len(group)), key=lambda one: one.evidence)
@@ -202,7 +205,7 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
                 ahead.append(best)
         for trial in sorted(ahead, key=lambda one: -one.evidence):
             progress("Trying what may be untrue", 0, 0)
-            made = _without(found, trial, loss)
+            made = _without(found, stated if trial.fault.kind == "ground" else found, trial, loss)
             if made is not None:
                 break
         else:
@@ -215,12 +218,26 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
     return Mended(found, tuple(faults))
 
 
-def _without(found: Found, trial: _Trial, loss: Loss) -> tuple[Fault, Found] | None:
-    """The fit without a fault; None where the squares do not fall by as much as they should."""
-    base, before = found.problem, found.solution
-    if trial.fault.kind == "ground" and max(base.ground.contact_scale, base.ground.terrain_scale) > AS_STATED:
-        base = replace(base, ground=base.ground.scaled(1.0, 1.0))
-        before = solve(base, before.state, loss)
+def _as_stated(found: Found, loss: Loss) -> Found:
+    """The fit with a terrain as accurate as stated, where it found one that is much less so.
+
+    A single contact that is off makes all of the terrain seem so.
+    """
+    ground = found.problem.ground
+    if max(ground.contact_scale, ground.terrain_scale) < AS_STATED:
+        return found
+    problem = replace(found.problem, ground=ground.scaled(1.0, 1.0))
+    return replace(found, problem=problem, solution=solve(problem, found.solution.state, loss))
+
+
+def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault, Found] | None:
+    """The fit without a fault; None where the squares do not fall by as much as they should.
+
+    Parameters
+    ----------
+    at : the fit to whose problem the fault is added, the same or `_as_stated`.
+    """
+    base, before = at.problem, at.solution
     fault, step, state, problem = trial.fault, trial.step, before.state, base
     for _ in range(ROUNDS):
         fault = replace(fault, value=fault.value + step)
@@ -246,8 +263,9 @@ def _without(found: Found, trial: _Trial, loss: Loss) -> tuple[Fault, Found] | N
     variance = max(_scatter(solution), found.noise**-2.0) * _alike(problem, solution)
     gain = (objective(before, loss) - objective(solution, loss)) / variance
     if fault.kind == "ground":
-        gain += _log_det(problem.ground.whitening) - _log_det(base.ground.whitening)
-        gain -= (_log_det(solution.information) - _log_det(before.information)) / 2
+        gain = _likelihood(problem, solution, loss) - _likelihood(base, before, loss)
+        if at is not found and gain < _likelihood(found.problem, found.solution, loss) - _likelihood(base, before, loss):
+            return None
     else:
         prior = prior_sigma(base, fault)
         gain -= 0.5 * float(((fault.value / prior) ** 2).sum())
@@ -261,6 +279,11 @@ def _without(found: Found, trial: _Trial, loss: Loss) -> tuple[Fault, Found] | N
     if fault.kind == "ground" and max(mended.problem.ground.contact_scale, mended.problem.ground.terrain_scale) > AS_STATED:
         return None
     return fault, mended
+
+
+def _likelihood(problem: Problem, solution: Solution, loss: Loss) -> float:
+    """Logarithm of the likelihood of a problem whose ground has other standard deviations, but for a constant."""
+    return -objective(solution, loss) + _log_det(problem.ground.whitening) - _log_det(solution.information) / 2
 
 
 def _log_det(matrix: Array) -> float:

@@ -84,8 +84,7 @@ def with_covariance(
         covariance, tracks = accelerations.covariance, accelerations.tracks
         setup = replace(setup, problem=accelerations.problem)
     covariance[: len(poses), : len(poses)] += poses @ poses.T + faults @ faults.T
-    if mended is not None and mended.otherwise is not None:
-        other = mended.otherwise
+    for other in () if mended is None else mended.otherwise:
         away = np.column_stack([other.centre - solution.state.centre, other.time_s - solution.state.time_s]).ravel()
         covariance[: away.size, : away.size] += np.outer(away, away)
     odds = np.array([np.exp(-rival.worse / scale**2) for rival in rivals])

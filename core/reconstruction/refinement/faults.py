@@ -26,6 +26,8 @@ MOST_INSTANTS = 150
 """Instants of a view between which a jump is sought at first, before those about the likeliest."""
 
 
+RARE = {"gap": 100.0, "ground": 10.0, "zoom": 100.0, "rate": 100.0}
+"""One fit of so many has a fault of a kind: blocks dig into the ground, videos are cut less often."""
 NEARLY_ONE = 0.7
 """Frames that are missing, from which they are counted."""
 FEWEST_CONTACTS = 2
@@ -47,6 +49,7 @@ class Fault:
         by which the focal length is larger at the knots; part by which times are longer.
     knots_s : (p,) video times of the knots of a focal length.
     sigma : (p,) standard deviation of the size.
+    doubtful : accelerations of the flights explain more of it: it was not taken out.
     """
 
     kind: Kind
@@ -56,6 +59,7 @@ class Fault:
     value: Array
     knots_s: Array
     sigma: Array
+    doubtful: bool = False
 
 
 def frame_s(problem: Problem, view: int) -> float:
@@ -158,6 +162,11 @@ def prior_sigma(problem: Problem, fault: Fault) -> float:
     return {"ground": SIGMA_GONE_M, "zoom": SIGMA_ZOOM, "rate": SIGMA_RATE}[fault.kind]
 
 
+def rarity(fault: Fault) -> float:
+    """Logarithm of in how many fits one such fault is."""
+    return float(np.log(RARE[fault.kind]))
+
+
 def columns_of(problem: Problem, state: Unknowns, by_time: Array, faults: Sequence[Fault]) -> Array:
     """(rows, c) derivatives of the residuals by the numbers of some faults, about the sizes that the problem has.
 
@@ -214,13 +223,16 @@ def in_words(problem: Problem, fault: Fault, contact: str) -> str:
         frames = "frame" if number in ("1", "part of a") else "frames"
         are = "is" if frames == "frame" else "are"
         what = f"{number} {frames} {are} missing" if size > 0 else f"{number} {frames} too many {are} there"
+        if fault.doubtful:
+            return f"View {name}: perhaps {what} after {fault.at:.3f} s of its video: compare the pictures there."
         return (
             f"View {name}: {what} after {fault.at:.3f} s of its video (frame {fault.at / frame:.0f}): all later ones "
             f"were taken {1e3 * abs(size):.0f} ± {1e3 * sigma:.0f} ms {'later' if size > 0 else 'earlier'} than the "
             "file says. Times, speeds and the clock of this view are corrected for it: compare the pictures there."
         )
     least, most = 100 * float(fault.value.min()), 100 * float(fault.value.max())
+    seems = "may zoom" if fault.doubtful else "zooms"
     return (
-        f"View {name}: the lens zooms, by {least:+.1f} to {most:+.1f} % of the focal length, as the pixels tell. The "
-        "deviations contain how well they do: give the focal length of each frame, or film without zooming."
+        f"View {name}: the lens {seems}, by {least:+.1f} to {most:+.1f} % of the focal length, as the pixels tell. The "
+        "deviations contain it: check the footage for a zoom, and film without one."
     )

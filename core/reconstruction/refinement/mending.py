@@ -19,7 +19,7 @@ from ...vectors import Array
 from ..choices import Loss
 from .accelerations import find_accelerations
 from .correlation import track_noise
-from .faults import Fault, applied, candidates, columns_of, gaps, prior_sigma
+from .faults import Fault, applied, candidates, columns_of, gaps, prior_sigma, rarity
 from .problem import CLOCK_COLUMN, NODE, POSE_COLUMNS, Problem, Rows, Unknowns, ground_distances
 from .search import Found, solve_with_noise
 from .solver import HUBER, REJECTED, Solution, objective, solve
@@ -27,12 +27,12 @@ from .solver import HUBER, REJECTED, Solution, objective, solve
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-RARE = float(np.log(100.0))
-"""One fit of so many has a fault of a kind."""
 ASKED_FOR = 4.0
 """Logarithm of the ratio of likelihoods, with how rare it is, from which a fault is there."""
 MOST, ROUNDS, SETTLED = 4, 8, 0.05
 """Faults of a fit, steps to the size of one, and a last step in its standard deviations."""
+BESIDE = 0.5
+"""What explains so much of what another cause does, by the logarithms of their likelihoods, is not ruled out by it."""
 AS_STATED = 1.5
 """One contact alone is off the ground where the terrain is by no more than so many times what was stated elsewhere."""
 LEAST_RATE = 0.025
@@ -47,13 +47,13 @@ class Mended:
     ----------
     found : the fit.
     faults : in the order in which they were found.
-    otherwise : where the unknowns would be with another capture rate: this one fault stays in the problem, since the
-        clock is a person's to set.
+    otherwise : where the unknowns would be with another capture rate, which stays in the problem since it is a
+        person's to set; and with or without a fault that accelerations of the flights explain about as well.
     """
 
     found: Found
     faults: tuple[Fault, ...] = ()
-    otherwise: Unknowns | None = None
+    otherwise: tuple[Unknowns, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +169,7 @@ def _tried(linear: _Linear, faults: Sequence[Fault], count: int = 0) -> list[_Tr
         covariance = np.linalg.inv(told + known)
         step = covariance @ asked
         wide = np.linalg.slogdet(np.eye(fault.value.size) + sigma**2 * told)[1]
-        rare = RARE + float(np.log(count or len(faults)))
+        rare = rarity(fault) + float(np.log(count or len(faults)))
         evidence = 0.5 * float(asked @ step) - 0.5 * float(wide) - rare
         found.append(_Trial(fault, evidence, rare, step, covariance))
     return found
@@ -189,7 +189,7 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
     ----------
     found : the fit as everything was given.
     """
-    faults = list[Fault]()
+    faults, otherwise = list[Fault](), list[Unknowns]()
     for _ in range(MOST):
         linear = _linear(found.problem, found.solution, found.noise)
         stated = _as_stated(found, loss)
@@ -210,12 +210,14 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
                 break
         else:
             break
-        fault, mended = made
+        fault, mended, in_doubt = made
         faults.append(fault)
-        if fault.kind == "rate":
-            return Mended(found, tuple(faults), mended.solution.state)
+        if fault.kind == "rate" or fault.doubtful:
+            return Mended(found, tuple(faults), (*otherwise, mended.solution.state))
+        if in_doubt:
+            otherwise.append(found.solution.state)
         found = mended
-    return Mended(found, tuple(faults))
+    return Mended(found, tuple(faults), tuple(otherwise))
 
 
 def _as_stated(found: Found, loss: Loss) -> Found:
@@ -230,7 +232,7 @@ def _as_stated(found: Found, loss: Loss) -> Found:
     return replace(found, problem=problem, solution=solve(problem, found.solution.state, loss))
 
 
-def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault, Found] | None:
+def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault, Found, bool] | None:
     """The fit without a fault; None where the squares do not fall by as much as they should.
 
     Parameters
@@ -272,13 +274,15 @@ def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault,
         gain += 0.5 * (_log_det(again.covariance) - 2 * fault.value.size * float(np.log(prior)))
     gain -= trial.rare
     rival = find_accelerations(found.problem, found.solution, found.noise)
-    if gain < max(ASKED_FOR, 0.0 if rival is None else rival.gain):
+    against = 0.0 if rival is None else rival.gain - trial.rare  # accelerations are not taken for rare
+    if gain < max(ASKED_FOR, BESIDE * against):
         return None
+    fault = replace(fault, doubtful=gain < against)
     unscaled = replace(problem, sigma_px=problem.sigma_px / found.noise, ground=problem.ground.scaled(1.0, 1.0))
     mended = solve_with_noise(unscaled, state, loss)
     if fault.kind == "ground" and max(mended.problem.ground.contact_scale, mended.problem.ground.terrain_scale) > AS_STATED:
         return None
-    return fault, mended
+    return fault, mended, against > BESIDE * gain
 
 
 def _likelihood(problem: Problem, solution: Solution, loss: Loss) -> float:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Clocks: from a video's own timestamps to the time that all videos and picks share."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, overload
 
@@ -47,8 +47,7 @@ class Clock:
     gaps: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        values = (self.offset_s, self.drift, self.origin_s, self.rate, *(value for gap in self.gaps for value in gap))
-        if not (np.isfinite(values).all() and self.rate > 0 and self.drift > -1):
+        if not (np.isfinite(self.numbers).all() and self.rate > 0 and self.drift > -1):
             raise InputError(
                 f"This clock does not run: offset {self.offset_s:g} s, drift {self.drift:g}, "
                 f"origin {self.origin_s:g} s, rate {self.rate:g}",
@@ -90,6 +89,17 @@ class Clock:
             return video_s
         late = sum(np.where(np.asarray(video_s) > at, lost, 0.0) for at, lost in self.gaps)
         return float(video_s + late) if np.ndim(video_s) == 0 else video_s + late
+
+    @property
+    def numbers(self) -> list[float]:
+        """All of it as a list: offset, drift, origin, rate, and both numbers of each gap."""
+        return [self.offset_s, self.drift, self.origin_s, self.rate, *(value for gap in self.gaps for value in gap)]
+
+    @classmethod
+    def of_numbers(cls, numbers: Iterable[float]) -> "Clock":
+        """The clock of such a list."""
+        offset_s, drift, origin_s, rate, *gaps = (float(value) for value in numbers)
+        return cls(offset_s, drift, origin_s, rate, tuple(zip(gaps[::2], gaps[1::2], strict=True)))
 
     def with_gap(self, at_s: float, lost_s: float) -> "Clock":
         """With a further gap; one at the same frame is changed by as much."""

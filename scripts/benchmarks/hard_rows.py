@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from refinement import CAMERA, SIGMA_TRACK, TERRAIN, Case, film
+from refinement import CAMERA, TERRAIN, Case, film
 from rn_intervals import GIVEN_STEP_M, TRUE_STEP_M, Slope, make_slope, truth_of
 from rockfall.core.camera.model import project, rays
 from rockfall.core.reconstruction.picks import Picks
@@ -233,9 +233,7 @@ def zoomed(scene: Scene, truth: Fall, rng: np.random.Generator) -> Trial:
     point = cast_rays(trial.surface, origin, direction).point
     near = closest_points(trial.surface, trial.picks.position).point
     point = np.where(np.isfinite(point) & (np.linalg.norm(point - near, axis=1) < 20)[:, None], point, near)
-    return replace(
-        trial, pixels=replace(trial.pixels, pixel=pixel), picks=replace(trial.picks, position=point)
-    )
+    return replace(trial, pixels=replace(trial.pixels, pixel=pixel), picks=replace(trial.picks, position=point))
 
 
 ROWS: dict[str, RowOf] = {

@@ -96,7 +96,9 @@ def with_covariance(
         away[:, 3] = rival.time_s - solution.state.time_s[rival.nodes]
         place = (NODE * rival.nodes[:, None] + np.arange(NODE)).ravel()
         covariance[place[:, None], place] += weight * np.outer(away, away)
-    return Fit(setup, solution, covariance, scale**2 * independent, scale, tracks, tuple(rivals), chance, accelerations, mended)
+    return Fit(
+        setup, solution, covariance, scale**2 * independent, scale, tracks, tuple(rivals), chance, accelerations, mended
+    )
 
 
 def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_end: bool) -> Array:

@@ -21,7 +21,7 @@ SIGMA_GAP_FRAMES, SIGMA_GONE_M, SIGMA_ZOOM, SIGMA_RATE = 4.0, 0.4, 0.04, 0.2
 """Standard deviations of a jump of a clock in frames, of what is gone of the ground [m], of a focal length at each knot
 and of a factor on times, as parts."""
 KNOTS = 5
-"""Of a focal length over the time of a track, linear between them."""
+"""Of a spline of the focal length over the time of a track."""
 MOST_INSTANTS = 150
 """Instants of a view between which a jump is sought at first, before those about the likeliest."""
 
@@ -74,9 +74,11 @@ def _later_nodes(problem: Problem, state: Unknowns, fault: Fault) -> Array:
     return np.asarray(state.time_s > instant, dtype=np.float64)
 
 
-def _hats(time_s: Array, knots_s: Array) -> Array:
-    """(m, p) weights of the knots at times."""
-    return np.stack([np.interp(time_s, knots_s, row) for row in np.eye(knots_s.size)], axis=1)
+def _spline(time_s: Array, knots_s: Array) -> Array:
+    """(m, p) by how much each knot weighs at times: a natural cubic spline."""
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(knots_s, np.eye(knots_s.size), bc_type="natural")(time_s))
 
 
 def _from_middle(problem: Problem, view: int) -> Array:
@@ -101,7 +103,7 @@ def applied(problem: Problem, state: Unknowns, fault: Fault, value: Array) -> tu
         contact[int(fault.at)] = np.hypot(contact[int(fault.at)], SIGMA_GONE_M)
         return replace(problem, ground=problem.ground.with_contact(contact)), state
     if fault.kind == "zoom":
-        larger = _hats(problem.video_s, fault.knots_s) @ value
+        larger = _spline(problem.video_s, fault.knots_s) @ value
         pixel = problem.pixel - _from_middle(problem, fault.view) * (larger / (1 + larger))[:, None]
         return replace(problem, pixel=pixel), state
     middle = float(state.time_s.mean())
@@ -147,9 +149,7 @@ def gaps(problem: Problem, view: int, about_s: float | None = None) -> list[Faul
     return [_fault("gap", view, float(at), picks) for picks in (False, True) for at in times]
 
 
-def _fault(
-    kind: Kind, view: int = -1, at: float = 0.0, picks: bool = False, knots_s: Array | None = None
-) -> Fault:
+def _fault(kind: Kind, view: int = -1, at: float = 0.0, picks: bool = False, knots_s: Array | None = None) -> Fault:
     knots = np.zeros(0) if knots_s is None else knots_s
     nothing = np.zeros(max(knots.size, 1))
     return Fault(kind, view, at, picks, nothing, knots, nothing)
@@ -196,7 +196,7 @@ def columns_of(problem: Problem, state: Unknowns, by_time: Array, faults: Sequen
             own[2 * m : 2 * m + n, 0] = weight * (problem.time_s - middle)
         else:
             away = -_from_middle(problem, fault.view) / problem.sigma_px[:, None]
-            own[: 2 * m] = (away[:, :, None] * _hats(problem.video_s, fault.knots_s)[:, None, :]).reshape(2 * m, -1)
+            own[: 2 * m] = (away[:, :, None] * _spline(problem.video_s, fault.knots_s)[:, None, :]).reshape(2 * m, -1)
     return columns
 
 

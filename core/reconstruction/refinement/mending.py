@@ -15,7 +15,7 @@ import numpy as np
 
 from ...least_squares import inverse
 from ...progress import Progress, silent
-from ...vectors import Array
+from ...vectors import Array, Indices
 from ..choices import Loss
 from .accelerations import find_accelerations
 from .correlation import track_noise
@@ -96,7 +96,6 @@ def _linear(problem: Problem, solution: Solution, noise: float) -> _Linear:
 
     evaluation, size, n = solution.evaluation, problem.columns.size, solution.state.time_s.size
     pixels = evaluation.pixels
-    m = len(pixels.residual)
     used = evaluation.segment >= 0
     length = np.sqrt((pixels.residual**2).sum(axis=1))
     root = np.sqrt(np.where(used, HUBER / np.maximum(length, HUBER), 0.0))
@@ -115,22 +114,23 @@ def _linear(problem: Problem, solution: Solution, noise: float) -> _Linear:
     on_ground = problem.surface is not None and bool(problem.grounded.size)
     ground = [evaluation.others[2]] if on_ground else []
     rest = [evaluation.others[1], *evaluation.others[2 + len(ground) :], *extra]
-    values, places, lines, residuals, start = [], [], [], [], 0
+    values, residuals, places, lines = list[Array](), list[Array](), list[Indices](), list[Indices]()
+    start = 0
     for rows in (weighted, times, *ground, *rest):
         r, d, q = rows.jacobian.shape
         free = np.broadcast_to((rows.columns >= 0)[:, None, :], (r, d, q))
         values.append(rows.jacobian[free])
         places.append(np.broadcast_to(rows.columns[:, None, :], (r, d, q))[free])
         line = start + np.broadcast_to(np.arange(r * d).reshape(r, d)[:, :, None], (r, d, q))
-        lines.append(line[free])
+        lines.append(np.asarray(line[free]))
         residuals.append(rows.residual.ravel())
         start += r * d
     cells = (np.concatenate(values), (np.concatenate(lines), np.concatenate(places)))
     jacobian = csr_array(cells, shape=(start, size))
-    own = inverse((jacobian.T @ jacobian).toarray(), partly=True)
+    inverted = inverse((jacobian.T @ jacobian).toarray(), partly=True)
     by_time = np.where(used[:, None], pixels.jacobian[:, :, CLOCK_COLUMN], 0.0)
     spare = max(2.0 * float(used.sum()) - size, 1.0)
-    return _Linear(problem, solution, np.concatenate(residuals), jacobian, own, root, by_time, spare, noise**-2.0)
+    return _Linear(problem, solution, np.concatenate(residuals), jacobian, inverted, root, by_time, spare, noise**-2.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,15 +220,18 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
     return Mended(found, tuple(faults), tuple(otherwise))
 
 
+def _is_as_stated(problem: Problem) -> bool:
+    return max(problem.ground.contact_scale, problem.ground.terrain_scale) < AS_STATED
+
+
 def _as_stated(found: Found, loss: Loss) -> Found:
     """The fit with a terrain as accurate as stated, where it found one that is much less so.
 
     A single contact that is off makes all of the terrain seem so.
     """
-    ground = found.problem.ground
-    if max(ground.contact_scale, ground.terrain_scale) < AS_STATED:
+    if _is_as_stated(found.problem):
         return found
-    problem = replace(found.problem, ground=ground.scaled(1.0, 1.0))
+    problem = replace(found.problem, ground=found.problem.ground.scaled(1.0, 1.0))
     return replace(found, problem=problem, solution=solve(problem, found.solution.state, loss))
 
 
@@ -254,9 +257,9 @@ def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault,
             fault = _gone(problem, solution, fault)
             break
         if fault.kind == "gap":
-            at = _jump(problem, solution, fault)
-            if at != fault.at:
-                problem, fault = base, replace(fault, at=at)
+            instant = _jump(problem, solution, fault)
+            if instant != fault.at:
+                problem, fault = base, replace(fault, at=instant)
                 continue
         if (np.abs(step) < SETTLED * sigma).all():
             break
@@ -266,7 +269,7 @@ def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault,
     gain = (objective(before, loss) - objective(solution, loss)) / variance
     if fault.kind == "ground":
         gain = _likelihood(problem, solution, loss) - _likelihood(base, before, loss)
-        if at is not found and gain < _likelihood(found.problem, found.solution, loss) - _likelihood(base, before, loss):
+        if _likelihood(problem, solution, loss) < _likelihood(found.problem, found.solution, loss):
             return None
     else:
         prior = prior_sigma(base, fault)
@@ -275,12 +278,12 @@ def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault,
     gain -= trial.rare
     rival = find_accelerations(found.problem, found.solution, found.noise)
     against = 0.0 if rival is None else rival.gain - trial.rare  # accelerations are not taken for rare
-    if gain < max(ASKED_FOR, BESIDE * against):
+    if gain < max(ASKED_FOR, against * (BESIDE if fault.kind == "zoom" else 1.0)):
         return None
     fault = replace(fault, doubtful=gain < against)
     unscaled = replace(problem, sigma_px=problem.sigma_px / found.noise, ground=problem.ground.scaled(1.0, 1.0))
     mended = solve_with_noise(unscaled, state, loss)
-    if fault.kind == "ground" and max(mended.problem.ground.contact_scale, mended.problem.ground.terrain_scale) > AS_STATED:
+    if fault.kind == "ground" and not _is_as_stated(mended.problem):
         return None
     return fault, mended, against > BESIDE * gain
 

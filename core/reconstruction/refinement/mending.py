@@ -268,9 +268,11 @@ def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault,
     variance = max(_scatter(solution), found.noise**-2.0) * _alike(problem, solution)
     gain = (objective(before, loss) - objective(solution, loss)) / variance
     if fault.kind == "ground":
-        gain = _likelihood(problem, solution, loss) - _likelihood(base, before, loss)
-        if _likelihood(problem, solution, loss) < _likelihood(found.problem, found.solution, loss):
-            return None
+        with_it, without, as_found = (
+            _likelihood(one, other.state, variance, loss)
+            for one, other in ((problem, solution), (base, before), (found.problem, found.solution))
+        )
+        gain = with_it - max(without, as_found - trial.rare - ASKED_FOR)
     else:
         prior = prior_sigma(base, fault)
         gain -= 0.5 * float(((fault.value / prior) ** 2).sum())
@@ -288,8 +290,15 @@ def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault,
     return fault, mended, against > BESIDE * gain
 
 
-def _likelihood(problem: Problem, solution: Solution, loss: Loss) -> float:
-    """Logarithm of the likelihood of a problem whose ground has other standard deviations, but for a constant."""
+def _likelihood(problem: Problem, state: Unknowns, variance: float, loss: Loss) -> float:
+    """Logarithm of the likelihood of a problem whose ground has other standard deviations, but for a constant.
+
+    Parameters
+    ----------
+    variance : factor on that of the pixels.
+    """
+    wider = replace(problem, sigma_px=np.sqrt(variance) * problem.sigma_px)
+    solution = solve(wider, state, loss)
     return -objective(solution, loss) + _log_det(problem.ground.whitening) - _log_det(solution.information) / 2
 
 

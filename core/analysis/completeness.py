@@ -276,16 +276,15 @@ def completeness_remarks(
             yield Remark(text, "warning", "completeness")
         return
     if not sign:
-        seen = f"Nothing in these {runs} runs shows that short ones are missing"
-        sign = f"{seen} (p = {found.p:.2g}), which few runs would not." if found is not None else ""
-        if found is None:
-            sign = "The run-outs that are known are too few to tell."
+        sign = "Too few run-outs are known to test it."
+        if found is not None:
+            sign = f"The test finds no missing short runs (p = {found.p:.2g}); with few runs it finds them rarely."
     if changed is not None:
         values = ", ".join(
             f"{name} {median:.3g} ({low:.3g} … {high:.3g})"
             for name, median, low, high in zip(changed.names, changed.median, changed.low, changed.high, strict=True)
         )
-        sign += f" Were they the longest third of all falls, the parameters would be {values}."
+        sign += f" If they are the longest third of all falls, the parameters are {values}."
     missing = found is not None and found.p < UNLIKELY
     text = f"{_not_known(stated)} {sign}{_how_to_state(stated)}"
     yield Remark(text, "warning" if missing else "advice", "completeness")

@@ -71,7 +71,7 @@ FIELDS: dict[str, Field] = {
 """Name → what it is. An empty cell means: not defined."""
 
 
-END = re.compile(r"(rn|rt|r|theta1_deg|theta_dev_deg)(_contact)?_(low|high)")
+END = re.compile(r"(rn|rt|r|theta1_deg|theta_dev_deg)_(low|high)")
 """A column with an end of an interval."""
 
 
@@ -80,9 +80,9 @@ def field_of(name: str) -> Field:
     if name in FIELDS:
         return FIELDS[name]
     if (match := END.fullmatch(name)) is not None:
-        column, contact, end = match.groups()
+        column, end = match.groups()
         of = FIELDS[column]
-        what = f"{end.capitalize()} end of the 95 % interval of {column}{', roughness included' if contact else ''}"
+        what = f"{end.capitalize()} end of the 95 % interval of {column}"
         if end == "high":
             what += "; empty beside a low end: no limit"
         return Field("number", of.unit, what, of.minimum, of.maximum)

@@ -15,7 +15,7 @@ from ..georeference import GlobalShift
 from ..output import output_stream
 from ..reading import reader
 from ..reconstruction.impact import FLAGS, Impacts, apparent
-from ..reconstruction.intervals import INTERVALS
+from ..reconstruction.intervals import JUDGED
 from ..reconstruction.picks import Picks, make_picks
 from ..reconstruction.sampling import TrajectorySamples
 from ..vectors import Array, Indices, Mask, Names, dot
@@ -85,10 +85,9 @@ _NUMBERS = (*_BEFORE, *_DERIVED, *_BLOCK)
 _UNCERTAIN = (*_DERIVED, *(column for column in _MORE if column[1] in ("kinetic1_j", "kinetic2_j")))
 """What can have a standard deviation, in a column of its own."""
 _ENDS: tuple[tuple[str, str, int, bool], ...] = tuple(
-    (f"{name}{ground}_{end}", attribute + ground, i, degrees)
-    for ground in ("", "_contact")
+    (f"{name}_{end}", attribute, i, degrees)
     for name, attribute, _, degrees in _DERIVED
-    if attribute + ground in INTERVALS
+    if attribute in JUDGED
     for i, end in enumerate(("low", "high"))
 )
 """Ends of intervals: name in the file, name of the interval, which end, whether it is an angle in degrees."""

@@ -53,7 +53,7 @@ def find_impacts(motion: Motion, *, site: str, eq10: DeviationForm) -> Impacts:
     intervals: dict[str, Array] = {}
     if np.isfinite(picks.sigma_time_s).any() or np.isfinite(picks.sigma_position_m).any():
         covariance = pick_covariance(picks, flights, incident, restituted, own, leaving)
-        errors = ImpactErrors(covariance, ground.by_place, ground.tilt, ground.spread)
+        errors = ImpactErrors(covariance, ground.by_place, ground.tilt)
         sigma = impact_sigmas(values, v1, v2, normal, mass, errors)
         intervals = impact_intervals(values, v1, v2, normal, errors)
 

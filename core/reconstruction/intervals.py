@@ -13,10 +13,7 @@ from .uncertainty import ERRORS
 
 SCALARS = ("vn1", "vt1", "vn2", "vt2", "rn", "rt", "r", "theta1", "theta_dev")
 JUDGED = ("rn", "rt", "r", "theta1", "theta_dev")
-"""What has an interval,"""
-OF_CONTACT = ("rn_contact", "rt_contact", "theta1_contact")
-"""and these another one, for the ground that the block meets: the normal is off by the roughness, too."""
-INTERVALS = (*JUDGED, *OF_CONTACT)
+"""What has an interval."""
 COVERAGE = 0.95
 DRAWS_LOG2 = 9
 """Draws of an interval: 2 to this power."""
@@ -48,14 +45,11 @@ class ImpactErrors:
     covariance : (n, 9, 9) of v1, v2 [m/s] and the place [m]; rows of a velocity that is not known are NaN.
     by_place : (n, 3, 3) change of the block-scale normal with the place [1/m].
     tilt : (n,) root mean square angle by which that normal is off, wherever it is [rad]; NaN counts as none.
-    roughness : (n,) root mean square angle between the ground that the block meets and the block-scale plane [rad];
-        NaN or zero where it is not known.
     """
 
     covariance: Array
     by_place: Array
     tilt: Array
-    roughness: Array
 
     def known(self) -> tuple[Mask, Mask]:
         """(n,) something is known of the error of v1, of v2."""
@@ -150,9 +144,8 @@ def impact_intervals(
 
     Returns
     -------
-    `INTERVALS` → (n, 2) lower and upper end; NaN where undefined or not known, those of the contact also where the
-    roughness is not known. The upper end is infinite where the block may have passed along the ground, since R_N has no
-    limit there.
+    `JUDGED` → (n, 2) lower and upper end; NaN where undefined or not known. The upper end is infinite where the block
+    may have passed along the ground, since R_N has no limit there.
 
     Notes
     -----
@@ -160,7 +153,7 @@ def impact_intervals(
     interval in every table. All errors are normal; coefficients and angles are not.
     """
     n = len(v1)
-    result = {name: np.full((n, 2), np.nan) for name in INTERVALS}
+    result = {name: np.full((n, 2), np.nan) for name in JUDGED}
     known1, known2 = errors.known()
     both = known1 & known2 & np.isfinite(values.r)
     only1 = known1 & ~both & np.isfinite(values.theta1)
@@ -170,11 +163,9 @@ def impact_intervals(
         some = rows[start : start + ROWS]
         drawn = _drawn(v1[some], v2[some], normal[some], roots[start : start + ROWS], errors, some)
         ends = _ends(drawn)
-        for i, name in enumerate(INTERVALS):
-            value = getattr(values, name.removesuffix("_contact"))[some]
-            defined = np.isfinite(value) & (both[some] | name.startswith("theta1"))
-            if name in OF_CONTACT:
-                defined &= np.nan_to_num(errors.roughness[some]) > 0
+        for i, name in enumerate(JUDGED):
+            value = getattr(values, name)[some]
+            defined = np.isfinite(value) & (both[some] | (name == "theta1"))
             low, high = np.minimum(ends[:, i, 0], value), np.maximum(ends[:, i, 1], value)
             result[name][some] = np.where(defined[:, None], np.stack([low, high], axis=1), np.nan)
     return result
@@ -182,38 +173,34 @@ def impact_intervals(
 
 @cache
 def _draws() -> Array:
-    """(m, 13) standard normal draws: of velocities and place, of the normal's tilt, of the roughness."""
+    """(m, 11) standard normal draws: of velocities and place, and of the normal's tilt."""
     from scipy.special import ndtri
 
     return np.asarray(ndtri(np.load(DRAWS_FILE) / 2.0**32))
 
 
 def _drawn(v1: Array, v2: Array, normal: Array, roots: Array, errors: ImpactErrors, rows: Indices) -> Array:
-    """(k, 8, m) draws of `INTERVALS`; a block that passes along the ground has an infinite R_N."""
+    """(k, 5, m) draws of `JUDGED`; a block that passes along the ground has an infinite R_N."""
     draws = _draws()
     away = np.swapaxes(roots @ draws[:, :ERRORS].T, 1, 2)  # (k, m, 9)
     into, out = v1[:, None, :] + away[:, :, :3], v2[:, None, :] + away[:, :, 3:6]
     off = away[:, :, 6:] @ np.swapaxes(errors.by_place[rows], 1, 2)
     axes = np.stack(perpendicular(normal), axis=1)  # (k, 2, 3)
-    tilts = []
-    for angle, column in ((errors.tilt, ERRORS), (errors.roughness, ERRORS + 2)):
-        size = np.nan_to_num(angle[rows])[:, None, None] / np.sqrt(2)
-        tilts.append(size * (draws[:, column : column + 2] @ axes))
-    plane = normal[:, None, :] + off + tilts[0]
+    tilt = np.nan_to_num(errors.tilt[rows])[:, None, None] / np.sqrt(2) * (draws[:, ERRORS:] @ axes)
+    ground = unit(normal[:, None, :] + off + tilt)
     side = np.where(dot(v2, normal) < 0, -1.0, 1.0)[:, None]
     speed1, speed2, along = norm(into), norm(out), dot(into, out)
-    columns = {}
-    for suffix, ground in (("", unit(plane)), ("_contact", unit(plane + tilts[1]))):
-        approach, escape = -dot(into, ground), side * dot(out, ground)
-        along1, along2 = (np.sqrt(np.maximum(s**2 - n**2, 0.0)) for s, n in ((speed1, approach), (speed2, escape)))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            columns["rn" + suffix] = np.where(approach > 0, np.maximum(escape, 0.0) / approach, np.inf)
-            columns["rt" + suffix] = along2 / along1
-        columns["theta1" + suffix] = np.arctan2(np.maximum(approach, 0.0), along1)
+    approach, escape = -dot(into, ground), side * dot(out, ground)
+    along1, along2 = (np.sqrt(np.maximum(s**2 - n**2, 0.0)) for s, n in ((speed1, approach), (speed2, escape)))
     with np.errstate(invalid="ignore", divide="ignore"):
-        columns["r"] = speed2 / speed1
-        columns["theta_dev"] = np.arccos(np.clip(along / (speed1 * speed2), -1.0, 1.0))
-    return np.stack([columns[name] for name in INTERVALS], axis=1)
+        columns = {
+            "rn": np.where(approach > 0, np.maximum(escape, 0.0) / approach, np.inf),
+            "rt": along2 / along1,
+            "r": speed2 / speed1,
+            "theta1": np.arctan2(np.maximum(approach, 0.0), along1),
+            "theta_dev": np.arccos(np.clip(along / (speed1 * speed2), -1.0, 1.0)),
+        }
+    return np.stack([columns[name] for name in JUDGED], axis=1)
 
 
 def _ends(drawn: Array) -> Array:
@@ -224,8 +211,8 @@ def _ends(drawn: Array) -> Array:
 
 
 def undetermined(name: str, interval: Array) -> Mask:
-    """(n,) intervals (n, 2) of one of `INTERVALS` that leave nothing out."""
-    low, high = EVERYTHING[name.removesuffix("_contact")]
+    """(n,) intervals (n, 2) of one of `JUDGED` that leave nothing out."""
+    low, high = EVERYTHING[name]
     return (interval[:, 0] <= low) & (interval[:, 1] >= high)
 
 
@@ -234,7 +221,7 @@ def in_words(name: str, value: float, low: float, high: float, digits: int) -> s
 
     Parameters
     ----------
-    name : of `INTERVALS`; angles are in radians, and in degrees in the text.
+    name : of `JUDGED`; angles are in radians, and in degrees in the text.
     digits : after the point, more where the interval is that narrow.
     """
     if not np.isfinite(value):

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ...core.reconstruction.impact import Impacts
-from ...core.reconstruction.intervals import INTERVALS, JUDGED
+from ...core.reconstruction.intervals import JUDGED
 from ...core.vectors import Array, norm
 from . import store
 
@@ -30,7 +30,7 @@ SHAPE = {
     **dict.fromkeys(("kinetic1_j", "kinetic2_j", "bounce_height_m", "chord_height_m"), 1),
     **dict.fromkeys(map(_sigma_name, JUDGED), 1),
     **dict.fromkeys(("sigma_speed1", "sigma_speed2", "sigma_kinetic1_j", "sigma_kinetic2_j"), 1),
-    **{f"interval_{name}": 2 for name in INTERVALS},
+    **{f"interval_{name}": 2 for name in JUDGED},
 }
 """What is in the list, in this order, and how many numbers it has. Files hold it: another order is another schema."""
 _ENDS = np.cumsum(list(SHAPE.values())).tolist()

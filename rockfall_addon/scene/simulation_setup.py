@@ -24,9 +24,12 @@ from ...core.progress import Progress
 from ...core.reconstruction.drag import Drag
 from ...core.remarks import Remark, from_plain, gravest_first, to_plain
 from ...core.simulation.engine import Simulation
+from ...core.simulation.ground import Ground
+from ...core.simulation.release import Releases
 from ...core.terrain.cloud import Cloud
 from ...core.terrain.surface import Surface
 from ...core.workflow.maps import SCREENS, Mapped
+from ...core.workflow.mesh_check import change_remarks, mesh_changes
 from ...core.workflow.screens import outside_remarks, screen_remarks, tallies_of
 from ...core.workflow.simulation import ReleaseSource, Scenario, ground_of, remarks_of, run_models
 from . import (
@@ -62,6 +65,7 @@ class Plan:
     origins : release → when its blocks start in the scene.
     said : the settings in words that a file keeps, and their fingerprint.
     remarks : what of the measured trajectories is missing in it.
+    check_mesh : some blocks fall once more on a finer mesh.
     """
 
     scenario: Scenario
@@ -69,6 +73,7 @@ class Plan:
     origins: Mapping[str, Origin]
     said: dict[str, object]
     remarks: tuple[Remark, ...] = ()
+    check_mesh: bool = False
 
 
 def plan(scene: bpy.types.Scene, entry: SimulationEntry | None = None) -> Plan:
@@ -102,7 +107,8 @@ def planned(scene: bpy.types.Scene, entry: SimulationEntry) -> Plan:
         good, left_out = reconstruction.reconstruct_good(scene)
         measured = measured_rebounds(good.impacts)
     scenario = replace(scenario, measured=measured)
-    return Plan(scenario, screens.screens_of(scene), origins, {"print": fingerprint(scene)}, left_out)
+    check_mesh = scene.rockfall_simulation.check_mesh and entry.contact == "mesh"
+    return Plan(scenario, screens.screens_of(scene), origins, {"print": fingerprint(scene)}, left_out, check_mesh)
 
 
 def scenario_of(scene: bpy.types.Scene, entry: SimulationEntry, surface: Surface, source: ReleaseSource) -> Scenario:
@@ -167,7 +173,8 @@ def run(plan: Plan, progress: Progress) -> Found:
         )
     simulations = run_models(ground, releases, plan.scenario.settings, progress=progress)
     outside = outside_remarks(plan.screens, ground)
-    remarks = gravest_first([*plan.remarks, *remarks_of(simulations, models), *outside, *_stays(simulations)])
+    of_mesh = _mesh_remarks(plan, ground, releases, progress)
+    remarks = gravest_first([*plan.remarks, *remarks_of(simulations, models), *outside, *_stays(simulations), *of_mesh])
     tallies = tallies_of(simulations, plan.screens, progress)
     shown = [with_barriers(one, tallies[one.settings.model].hits) if tallies else one for one in simulations]
     return Found([simulation.prepare(one) for one in shown], screens.results_of(tallies), tuple(remarks))
@@ -198,13 +205,19 @@ def export(plan: Plan, counts: Mapping[str, int], folder: Path, progress: Progre
             some = releases.take(slice(0, counts[one.model]))
             found += run_models(ground, some, [one], progress=progress)
     tallies = tallies_of(found, plan.screens, progress)
-    remarks = gravest_first([*remarks_of(found), *outside_remarks(plan.screens, ground), *screen_remarks(tallies)])
+    of_mesh = _mesh_remarks(plan, ground, releases, progress)
+    outside = outside_remarks(plan.screens, ground)
+    remarks = gravest_first([*remarks_of(found), *outside, *screen_remarks(tallies), *of_mesh])
     with output_folder(folder) as place:
         records = default_records(len(releases))
         mapped = Mapped(tuple(found), {model: {SCREENS: tally} for model, tally in tallies.items()})
         return write_simulations(
             found, place, record=records, inputs={}, remarks=remarks, mapped=mapped, progress=progress
         )
+
+
+def _mesh_remarks(plan: Plan, ground: Ground, releases: Releases, progress: Progress) -> list[Remark]:
+    return change_remarks(mesh_changes(plan.scenario, ground, releases, progress=progress)) if plan.check_mesh else []
 
 
 def _stays(simulations: Sequence[Simulation]) -> list[Remark]:

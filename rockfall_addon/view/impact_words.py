@@ -85,9 +85,8 @@ def measured(value: float, sigma: float, digits: int) -> str:
 
 
 def between(result: impact_numbers.Numbers, of: str, digits: int) -> str:
-    """A coefficient or an angle, or `…_contact`, with its 95 % interval; empty where it is not defined."""
-    key = of.removesuffix("_contact")
-    value = math.radians(result[f"{key}_deg"]) if key.startswith("theta") else result[key]
+    """A coefficient or an angle with its 95 % interval; empty where it is not defined."""
+    value = math.radians(result[f"{of}_deg"]) if of.startswith("theta") else result[of]
     return in_words(of, value, *result[f"interval_{of}"], digits)
 
 

@@ -4,8 +4,7 @@
 The terrain is a formula: a slope of 38° with waves of 0.7 to 14 m. Blocks bounce down it as in refinement.py and are
 filmed alike. The program is given points of it 0.4 m apart, each off by the scanner's noise, and nothing else. The
 true normal is that of the plane of least squares through the formula's surface within the block's scale of the true
-contact; the true normal of the contact is the direction from there to the centre of the sphere. Neither comes from
-anything that the program states.
+contact. It does not come from anything that the program states.
 """
 
 import argparse
@@ -15,7 +14,7 @@ import numpy as np
 from refinement import Case, film
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.impact import Impacts, apparent
-from rockfall.core.reconstruction.intervals import INTERVALS, JUDGED, OF_CONTACT
+from rockfall.core.reconstruction.intervals import JUDGED
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.refinement.refine import refine
 from rockfall.core.reconstruction.trajectory import reconstruct
@@ -84,11 +83,7 @@ def make_slope(rng: np.random.Generator) -> Slope:
 def truth_of(truth: Fall, slope: Slope, radius_m: float) -> dict[str, np.ndarray]:
     """The true values of all intervals."""
     values = apparent(truth.v1, truth.v2, slope.normals(truth.contact, radius_m))
-    away = truth.centre - truth.contact
-    contact = apparent(truth.v1, truth.v2, away / np.linalg.norm(away, axis=1)[:, None])
-    return {name: getattr(values, name) for name in JUDGED} | {
-        name: getattr(contact, name.removesuffix("_contact")) for name in OF_CONTACT
-    }
+    return {name: getattr(values, name) for name in JUDGED}
 
 
 def picked(truth: Fall, rng: np.random.Generator):
@@ -129,16 +124,16 @@ def impacts_of(
 
 def row_of(name: str, found: list[Impacts], true: list[dict[str, np.ndarray]]) -> list[str]:
     """A line of the table."""
-    cells, width = [name], {}
-    for key in INTERVALS:
+    cells = [name]
+    for key in JUDGED:
         ends = np.concatenate([one.intervals[key] for one in found])
         value = np.concatenate([one[key] for one in true])
         used = np.isfinite(ends[:, 0]) & np.isfinite(value)
-        width[key] = float(np.median((ends[used, 1] - ends[used, 0]) / 2))
+        if key == "rn":
+            width = float(np.median((ends[used, 1] - ends[used, 0]) / 2))
         cells.append(f"{100 * np.mean((ends[used, 0] <= value[used]) & (value[used] <= ends[used, 1])):.1f}")
     error = np.concatenate([one.rn for one in found]) - np.concatenate([one["rn"] for one in true])
-    cells.append(f"{np.nanmedian(np.abs(error)):.3f}")
-    return [*cells, f"{width['rn']:.3f}", f"{width['rn_contact']:.3f}", f"{width['rn_contact'] / width['rn']:.1f}"]
+    return [*cells, f"{np.nanmedian(np.abs(error)):.3f}", f"{width:.3f}"]
 
 
 def main() -> None:
@@ -151,7 +146,7 @@ def main() -> None:
     slope = make_slope(rng)
     fine = slope.mesh(TRUE_STEP_M, 0.0, rng)
     falls = [fall(fine, rng) for _ in range(arguments.falls)]
-    heads = ["95 % intervals", *INTERVALS, "R_N error", "half width", "of contact", "ratio"]
+    heads = ["95 % intervals", *JUDGED, "R_N error", "half width"]
     print("| " + " | ".join(heads) + " |\n|" + "---|" * len(heads))
     for sigma_m in (0.005, 0.02, 0.05):
         given = slope.mesh(GIVEN_STEP_M, sigma_m, rng)

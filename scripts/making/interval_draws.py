@@ -14,13 +14,14 @@ from scipy.stats import qmc
 
 BITS = 30
 """Of a number of SciPy's sequence."""
-BESIDE_ERRORS = 4
-"""Dimensions for the tilt of the normal (2) and for the roughness (2)."""
+USED, DIMENSIONS = ERRORS + 2, ERRORS + 4
+"""Two are for the tilt of the normal. The last two are not used: without them all points would be other ones."""
 
 
 def points() -> np.ndarray:
-    """(2^DRAWS_LOG2, 13) in [0, 1)."""
-    return qmc.Sobol(ERRORS + BESIDE_ERRORS, rng=np.random.default_rng(0), bits=BITS).random_base2(DRAWS_LOG2)
+    """(2^DRAWS_LOG2, 11) in [0, 1)."""
+    sequence = qmc.Sobol(DIMENSIONS, rng=np.random.default_rng(0), bits=BITS)
+    return sequence.random_base2(DRAWS_LOG2)[:, :USED]
 
 
 def main() -> None:

@@ -419,3 +419,21 @@ def test_a_seed_that_blender_cannot_hold_is_said(scan: bpy.types.Scene, part) ->
     assert scan.rockfall_simulation.seed == 5
     assert sources.keep_entry(scan, entry(seed=2**31 - 1)) == ""
     assert scan.rockfall_simulation.seed == 2**31 - 1
+
+
+def test_the_mesh_is_checked_where_that_is_asked_for(drawn: bpy.types.Scene, part) -> None:
+    def of_mesh() -> list[str]:
+        assert bpy.ops.rockfall.simulate() == {"FINISHED"}
+        found = part("rockfall_addon.scene.simulation_setup").remarks(drawn)
+        return [one.text for one in found if "divided" in one.text]
+
+    assert not of_mesh()
+    drawn.rockfall_simulation.check_mesh = True
+    plan = part("rockfall_addon.scene.simulation_setup").plan(drawn)
+    ground = part("core.workflow.simulation").ground_of(plan.scenario)
+    check = part("core.workflow.mesh_check")
+    changes = check.mesh_changes(plan.scenario, ground, plan.scenario.releases(ground))
+    assert {one.model for one in changes} == MODELS
+    assert set(of_mesh()) == {one.text for one in check.change_remarks(changes)}
+    drawn.rockfall_simulation.contact = "points"
+    assert not part("rockfall_addon.scene.simulation_setup").plan(drawn).check_mesh, "points have no mesh"

@@ -214,7 +214,7 @@ def _with_sigmas(
         normal_spread=spread,
         normal_radius_m=np.where(given, normals.radius_m[own], impacts.normal_radius_m),
     )
-    errors = ImpactErrors(covariance, normals.by_place[own], tilt, spread)
+    errors = ImpactErrors(covariance, normals.by_place[own], tilt)
     v1, v2, normal = impacts.v1, impacts.v2, impacts.normal
     sigma = impact_sigmas(impacts, v1, v2, normal, impacts.mass_kg, errors)
     intervals = impact_intervals(impacts, v1, v2, normal, errors)

@@ -25,8 +25,6 @@ JUDGED = (  # with an interval, for the normal at the block's scale: what is sho
     ("Impact angle θ₁", "theta1", 0),
     ("Deviation θ_dev", "theta_dev", 0),
 )
-OF_CONTACT = (("R_N", "rn_contact", 2), ("R_T", "rt_contact", 2), ("Impact angle θ₁", "theta1_contact", 0))
-"""And with one for the ground that the block met."""
 
 
 class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
@@ -50,7 +48,6 @@ class ROCKFALL_PT_impact(RockfallPanel, bpy.types.Panel):
         judged = [(label, impact_words.between(result, *how) or "not defined") for label, *how in JUDGED]
         numbers = (_fact(result, *how) for how in NUMBERS)
         facts(layout, [*judged, *numbers, *_slide(context.scene, pick), *spins.words(pick)])
-        _draw_contact(context, layout, result)
         reasons = impact_words.reasons(pick)
         for reason in reasons:
             paragraph(context, layout, reason, "ERROR")
@@ -69,14 +66,6 @@ def _slide(scene: bpy.types.Scene, pick: bpy.types.Object) -> list[tuple[str, st
         return []
     far = math.dist(pick[store.POSITION], later[0][store.POSITION])
     return [("Until the take-off", f"{far:.2f} m, {1e3 * (later[0][store.TIME] - pick[store.TIME]):.0f} ms")]
-
-
-def _draw_contact(context: bpy.types.Context, layout: bpy.types.UILayout, result: impact_numbers.Numbers) -> None:
-    """The intervals with the ground's roughness, where that is known."""
-    if not math.isfinite(result["interval_rn_contact"][0]):
-        return
-    paragraph(context, layout, "In brackets 95 %, for the normal at the block's scale; with its roughness:", "INFO")
-    facts(layout, [(label, impact_words.between(result, *how)) for label, *how in OF_CONTACT])
 
 
 def _draw_editable(layout: bpy.types.UILayout, editable: bpy.types.PropertyGroup) -> None:

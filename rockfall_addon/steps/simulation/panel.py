@@ -112,6 +112,8 @@ class ROCKFALL_PT_simulation_motion(_Sub, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         layout.row().prop(settings, "contact", expand=True)
+        if settings.contact == "mesh":
+            layout.prop(settings, "check_mesh")
         layout.prop(settings, "rolling")
         row = layout.row()
         row.active = settings.rolling != "none"

@@ -143,6 +143,11 @@ class SimulationSettings(bpy.types.PropertyGroup):
         ],
         default="mesh",
     )  # fmt: skip
+    check_mesh: BoolProperty(
+        name="Check the mesh", description="Also report how much the run-out depends on the triangles: some of the "
+        "blocks fall once more on a mesh whose triangles are divided until their edges are half a diameter",
+        default=False,
+    )  # fmt: skip
     rolling: EnumProperty(
         name="On the ground", description="How a block moves that no longer bounces",
         items=[

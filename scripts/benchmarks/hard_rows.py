@@ -30,8 +30,9 @@ from rockfall.core.terrain.surface import Surface
 from synthetic_falls import BLOCK, SIGMA_TERRAIN, Fall, fall
 
 FALLS_A_SLOPE = 10
-WRONG_M, WRONG_WAVES_M = 0.2, (3.0, 12.0)
-"""Root mean square height of waves by which a terrain is wrong, and the shortest and longest of them [m]."""
+GIVEN_WAVES_M, WRONG_M, WRONG_WAVES_M = (5.0, 40.0), 0.2, (3.0, 12.0)
+"""Shortest and longest waves of the errors of a terrain that is as accurate as is stated [m]; root mean square height,
+and shortest and longest, of those of one that is wrong."""
 LIFTED_M = 0.3
 STATED_CLICK_M = 0.13
 OUTLIERS, OUTLIER_PX = 0.08, 60.0
@@ -46,7 +47,7 @@ GONE_M, GONE_INNER_M, GONE_OUTER_M = 0.3, 0.8, 1.6
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A slope of waves, its surface, and what a scan without errors makes of it."""
+    """A slope of waves, its surface, and what a scan that is as accurate as is stated makes of it."""
 
     slope: Slope
     fine: Surface
@@ -116,22 +117,21 @@ def camera(scene: Scene, truth: Fall, rng: np.random.Generator, *, views: int = 
     return replace(trial, views=(moved(trial.views[0], np.array([0, 0, LIFTED_M])), *trial.views[1:]))
 
 
-def wrong_terrain(scene: Scene, rng: np.random.Generator) -> Surface:
-    """The given terrain with waves of metres that are not there."""
+def wavy(surface: Surface, size_m: float, waves_m: tuple[float, float], rng: np.random.Generator) -> Surface:
+    """A surface with waves that are not there."""
     count = 30
-    length, angle = rng.uniform(*WRONG_WAVES_M, count), rng.uniform(0, np.pi, count)
+    length, angle = rng.uniform(*waves_m, count), rng.uniform(0, np.pi, count)
     wave = 2 * np.pi / length[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    plan = scene.given.vertices[:, :2]
-    error = np.sin(plan @ wave.T + rng.uniform(0, 2 * np.pi, count)).sum(axis=1) * WRONG_M * np.sqrt(2 / count)
-    vertices = scene.given.vertices + np.outer(error, [0, 0, 1])
-    return Surface(vertices, scene.given.faces, scene.given.shift, "wrong")
+    phase = surface.vertices[:, :2] @ wave.T + rng.uniform(0, 2 * np.pi, count)
+    error = size_m * np.sqrt(2 / count) * np.sin(phase).sum(axis=1)
+    return Surface(surface.vertices + np.outer(error, [0, 0, 1]), surface.faces, surface.shift, surface.name)
 
 
 def terrain(
     scene: Scene, truth: Fall, rng: np.random.Generator, *, sigma_m: float | None = SIGMA_TERRAIN, views: int = 1
 ) -> Trial:
     """The terrain is wrong by much more than is stated, or nothing is stated."""
-    surface = wrong_terrain(scene, rng)
+    surface = wavy(scene.given, WRONG_M, WRONG_WAVES_M, rng)
     return filmed(scene, truth, rng, views=views, surface=surface, sigma_terrain_m=sigma_m, cause=TERRAIN)
 
 
@@ -314,7 +314,9 @@ def scenes(falls: int, seed: int) -> list[tuple[Scene, Fall]]:
     while len(found) < falls:
         slope = make_slope(rng)
         fine, given = slope.mesh(TRUE_STEP_M, 0.0, rng), slope.mesh(GIVEN_STEP_M, 0.005, rng)
-        scene = Scene(slope, fine, given)
+        half = SIGMA_TERRAIN * np.sqrt(0.5)  # of the variance is in the height of all of it, and half in waves
+        raised = Surface(given.vertices + [0, 0, half * rng.normal()], given.faces, given.shift, given.name)
+        scene = Scene(slope, fine, wavy(raised, half, GIVEN_WAVES_M, rng))
         found += [(scene, fall(fine, rng)) for _ in range(min(FALLS_A_SLOPE, falls - len(found)))]
     return found
 

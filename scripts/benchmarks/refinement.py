@@ -178,7 +178,7 @@ def solve_camera(
         sigma_px=pairs.sigma_px,
         sigma_m=pairs.sigma_m,
     )
-    return found.camera, found.covariance[:6, :6], least
+    return found.camera, found.pose_covariance_given_lens, least
 
 
 @dataclass(frozen=True, eq=False)

@@ -270,7 +270,7 @@ def test_what_is_drawn_over_the_footage(tracked, part, truth) -> None:
 
 
 def test_sightings_beyond_the_path_are_not_joined_with_it(tracked, part) -> None:
-    view, clocks = (part(f"rockfall_addon.{name}") for name in ("view.footage_view", "scene.clocks"))
+    view, clocks = (part(f"rockfall_addon.{name}") for name in ("view.footage_view", "scene.footage.clocks"))
     (camera,) = part("rockfall_addon.scene.footage.videos").cameras(tracked)
     first, *_, last = picks_of(tracked)
     bpy.data.objects.remove(last)

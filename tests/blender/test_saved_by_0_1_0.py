@@ -182,8 +182,7 @@ def test_numbers_of_impacts_come_over(opened, numbers, old) -> None:
         assert now[name]["rockfall_flags"] == kept["flags"]
         found = {key: np.atleast_1d(value).tolist() for key, value in numbers(now[name]).items() if key in kept}
         same(found, {key: np.atleast_1d(kept[key]).tolist() for key in found}, 1e-9, name)
-        of_contact = {f"interval_{name}_contact" for name in ("rn", "rt", "theta1")}  # which are no longer given
-        assert set(kept) - set(found) == {"flags"} | of_contact
+        assert set(kept) - set(found) == {"flags"}
 
 
 def test_files_hold_the_numbers_of_an_impact_in_this_order(part) -> None:
@@ -210,7 +209,17 @@ def test_numbers_that_cannot_be_computed_anew_come_over(scene, part, numbers, ol
     assert numbers(pick)["kinetic2_j"] == pytest.approx(kept["kinetic2_j"][0], nan_ok=True)
     assert np.isnan(numbers(pick)["interval_rn"]).all(), "0.1.0 had none"
     assert numbers(broken) is None
-    assert scene["rockfall_schema"] == 2
+    assert scene["rockfall_schema"] == 3
+
+
+def test_numbers_of_an_impact_lose_the_intervals_that_they_ended_with(scene, part, numbers) -> None:
+    pick = scene.objects["A impact 1"]
+    known = pick["rockfall_result"].to_list()
+    pick["rockfall_result"] = [*known, 0.1, 0.9, 0.2, 0.8, 0.3, 0.7]
+    scene["rockfall_schema"] = 2
+    assert part("rockfall_addon.scene.storage.migration").migrate(scene)
+    np.testing.assert_array_equal(pick["rockfall_result"].to_list(), known)
+    assert scene["rockfall_schema"] == 3
 
 
 def test_it_can_be_edited_and_saved_again(opened, part, old, tmp_path: Path, numbers) -> None:

@@ -109,7 +109,7 @@ def test_save_and_load(scene: bpy.types.Scene, part, tmp_path: Path) -> None:
     before = everything(scene, part), shown(scene)
     loaded = save_and_load(tmp_path / "a.blend")
     assert (everything(loaded, part), shown(loaded)) == before
-    assert loaded["rockfall_schema"] == 2
+    assert loaded["rockfall_schema"] == 3
     assert before[1] == (10, 2, 2, 6)
 
 
@@ -344,7 +344,7 @@ def test_a_file_of_the_version_before_is_brought_up_to_date(scene: bpy.types.Sce
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"), load_ui=False)
     scene = bpy.context.scene
-    assert scene["rockfall_schema"] == 2
+    assert scene["rockfall_schema"] == 3
     found = everything(scene, part)
     for name in ("ids", "time_s", "position", "extra", "shift"):
         assert found[name] == before[name], name

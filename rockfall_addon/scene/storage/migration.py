@@ -12,7 +12,7 @@ from ..picks import impact_numbers, keyframes, picks, trajectories
 from ..terrain import georeference
 from . import materials, set_aside, store
 
-SCHEMA = 2
+SCHEMA = 3
 
 
 def version(scene: bpy.types.Scene) -> int | None:
@@ -107,5 +107,13 @@ def _from_1(scene: bpy.types.Scene) -> None:
             del obj[store.RESULT]
 
 
-STEPS = (_from_0, _from_1)
+def _from_2(scene: bpy.types.Scene) -> None:
+    """The numbers of an impact ended with intervals of the ground that the block met."""
+    for obj in store.of_role(scene, store.PICK_ROLE):
+        kept = obj.get(store.RESULT)
+        if kept is not None and hasattr(kept, "to_list") and len(kept) == impact_numbers.WIDTH + 6:
+            obj[store.RESULT] = kept.to_list()[: impact_numbers.WIDTH]
+
+
+STEPS = (_from_0, _from_1, _from_2)
 """The step from each schema to the next."""

@@ -4,27 +4,12 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from .scene import (
-    appended,
-    comparison,
-    defaults,
-    fingerprints,
-    folders,
-    footage,
-    graph_settings,
-    impact_rows,
-    migration,
-    motion,
-    pick_names,
-    picks,
-    problems,
-    set_aside,
-    store,
-    sync,
-    terrain_mesh,
-    timing,
-    video_files,
-)
+from .scene import problems
+from .scene.footage import footage, sync, timing, video_files
+from .scene.models import comparison, graph_settings, motion
+from .scene.picks import impact_rows, pick_names, picks
+from .scene.storage import appended, defaults, fingerprints, folders, migration, set_aside, store
+from .scene.terrain import terrain_mesh
 from .view import job, strip, trail_lines
 from .view.graphs import editor, impact_sheet, motion_sheet, selection
 

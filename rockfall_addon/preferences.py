@@ -10,7 +10,7 @@ import bpy
 from .. import __package__ as ADDON_ID  # noqa: N812
 from .. import __version__
 from ..core.constants import ROCK_DENSITY_KGPM3
-from .scene.settings import BLOCK_SHAPES, COLOURINGS, DENSITIES, DIAMETERS
+from .scene.storage.settings import BLOCK_SHAPES, COLOURINGS, DENSITIES, DIAMETERS
 
 problem = ""
 """Why nothing but this module is registered; empty when all is well. Set by the add-on's `register`."""
@@ -52,7 +52,7 @@ class InstallationPanel(bpy.types.Panel):
 def _changed(self: bpy.types.AddonPreferences, context: bpy.types.Context) -> None:
     if problem:
         return
-    from .scene import defaults
+    from .scene.storage import defaults
 
     for scene in bpy.data.scenes:
         defaults.begin(scene)

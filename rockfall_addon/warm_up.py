@@ -10,7 +10,8 @@ import bpy
 
 from ..core.errors import DependencyError
 from . import preferences
-from .scene import models, preparation
+from .scene.models import models
+from .scene.picks import preparation
 
 AFTER_S = 0.5
 

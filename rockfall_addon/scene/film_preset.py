@@ -7,7 +7,8 @@ import bpy
 
 from ...core.exchange.project import ENGINES, RenderPreset
 from ...core.film.presets import BUILT_IN
-from . import store, timing
+from .footage import timing
+from .storage import store
 
 NAME = "film"
 """Of the preset that an exported project has for it."""

@@ -9,23 +9,12 @@ import numpy as np
 
 from ...core.remarks import Remark
 from ...core.workflow.noticed import moved_on, tracked_beyond, tracks_off_the_motion
-from . import (
-    alignment,
-    camera_paths,
-    clocks,
-    migration,
-    motion,
-    pictures,
-    places,
-    problems,
-    proposal,
-    set_aside_words,
-    sightings,
-    store,
-    terrain,
-    video_times,
-    videos,
-)
+from . import problems
+from .footage import alignment, camera_paths, clocks, pictures, sightings, video_times, videos
+from .models import motion
+from .picks import places, proposal
+from .storage import migration, set_aside_words, store
+from .terrain import terrain
 
 ALIGN_TOOL, PICK_TOOL = "rockfall.align_tool", "rockfall.pick_tool"
 MILLIMETRE_M = 0.001

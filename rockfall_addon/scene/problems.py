@@ -14,7 +14,9 @@ from ...core.camera.quality import remarks_on_quality
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark, from_plain, from_text, gravest_first, to_plain, to_text
 from ...core.workflow.noticed import impossible_sizes
-from . import camera_paths, fingerprints, migration, picks, set_aside_words, store, timing
+from .footage import camera_paths, timing
+from .picks import picks
+from .storage import fingerprints, migration, set_aside_words, store
 
 MOST = 6
 BACKSIDE = -0.17  # vertical part of a normal that points 10° or more below the horizon

@@ -35,27 +35,22 @@ from ...core.terrain.shading import shade
 from ...core.terrain.surface import Surface
 from ...core.terrain.writers import write_ply
 from ...core.workflow.opening import open_project, open_terrain
-from . import (
+from . import film_preset
+from .footage import project_videos, sync
+from .models import fit, models
+from .picks import picks, reconstruction
+from .simulation import (
     back_analysis,
-    film_preset,
-    fit,
-    georeference,
-    models,
-    picks,
     posterior,
-    project_videos,
-    reconstruction,
     screens,
-    set_aside_words,
     simulated_sources,
     simulated_trees,
     simulated_zones,
     simulation_setup,
-    store,
     structures,
-    sync,
-    terrain,
 )
+from .storage import set_aside_words, store
+from .terrain import georeference, terrain
 
 MODEL_TABLES = {"A": "models", "B": "models_b"}
 """Set of parameters → its tables in project.toml, [models.NAME] and [models_b.NAME]."""

@@ -7,7 +7,8 @@ from types import ModuleType
 import bpy
 
 from .. import view
-from ..scene import comparison_settings, graph_settings, model_parameters, motion_settings, settings
+from ..scene.models import comparison_settings, graph_settings, model_parameters, motion_settings
+from ..scene.storage import settings
 from ..view import toolbar
 from ..view.reporting import answer_in_words, leave_newer_alone
 

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ..scene import problems, store
+from ..scene import problems
+from ..scene.storage import store
 from . import look, workspace
 
 AFTER_S = 0.3  # the areas of a new workspace get their sizes when they are drawn

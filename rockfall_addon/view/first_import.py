@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import BoolProperty
 
-from ..scene import start_up
+from ..scene.storage import start_up
 from . import arranging, workspace
 from .from_file import FromFile
 

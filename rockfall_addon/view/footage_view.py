@@ -20,24 +20,9 @@ from ...core.reconstruction.trajectory import Reconstruction, reconstruct
 from ...core.terrain.raycast import cast_rays, heights_above
 from ...core.vectors import Array, cross, norm, perpendicular, unit
 from ...core.workflow.first_picks import FAR_M
-from ..scene import (
-    camera_paths,
-    clicks,
-    clocks,
-    fingerprints,
-    picks,
-    pictures,
-    places,
-    proposal,
-    reconstruction,
-    sightings,
-    spins,
-    store,
-    sync,
-    trails,
-    trajectories,
-    videos,
-)
+from ..scene.footage import camera_paths, clicks, clocks, pictures, sightings, sync, videos
+from ..scene.picks import picks, places, proposal, reconstruction, spins, trails, trajectories
+from ..scene.storage import fingerprints, store
 from . import spin_marks
 from .drawn import Drawing, Line, Mark, Path
 

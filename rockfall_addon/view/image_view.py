@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 
 from ...core.camera.path import project_at, rays_at
 from ...core.vectors import Array
-from ..scene import camera_paths, clocks, store, videos
+from ..scene.footage import camera_paths, clocks, videos
+from ..scene.storage import store
 
 SAME_SHAPE = 1e-3
 

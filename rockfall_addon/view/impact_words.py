@@ -7,7 +7,8 @@ import bpy
 
 from ...core.reconstruction.intervals import in_words
 from ...core.reconstruction.summary import MEANINGS
-from ..scene import impact_marks, impact_numbers, pick_names, spins, store
+from ..scene.picks import impact_marks, impact_numbers, pick_names, spins
+from ..scene.storage import store
 
 FLAG_WORDS = {
     "first": "First of its chain: no incident velocity",

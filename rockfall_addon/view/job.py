@@ -16,7 +16,8 @@ import bpy
 
 from ...core.errors import RockfallError
 from ...core.progress import CancelledError, Progress, silent
-from ..scene import problems, sync
+from ..scene import problems
+from ..scene.footage import sync
 from .panel import paragraph
 from .reporting import redraw, reported
 

@@ -8,7 +8,9 @@ import bpy
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Quaternion, Vector
 
-from ..scene import store, terrain, videos
+from ..scene.footage import videos
+from ..scene.storage import store
+from ..scene.terrain import terrain
 from .workspace import free_part
 
 AROUND = 1.15  # some air around what is framed

@@ -10,7 +10,9 @@ from ...core.camera.model import rays
 from ...core.errors import RockfallError
 from ...core.terrain.raycast import cast_ray
 from ...core.vectors import Array
-from ..scene import camera_paths, pictures, places, problems, reconstruction, video_files, videos
+from ..scene import problems
+from ..scene.footage import camera_paths, pictures, video_files, videos
+from ..scene.picks import places, reconstruction
 from . import drawing, footage_view, image_view, pointing, workspace
 
 SHOWN_BY = {"rockfall.pick_tool", "rockfall.spin_tool", "rockfall.align_tool"}

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..scene import camera_paths, videos
+from ..scene.footage import camera_paths, videos
 from .reporting import possible
 
 

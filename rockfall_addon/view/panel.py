@@ -7,7 +7,7 @@ from typing import Literal
 import bpy
 
 from ...core.remarks import Remark
-from ..scene import store
+from ..scene.storage import store
 from .wrapping import wrapped
 
 type State = Literal["TO_DO", "READY", "ATTENTION", "ANY_TIME"]

@@ -7,7 +7,7 @@ from bpy.props import EnumProperty, StringProperty
 from ...core.errors import RockfallError
 from ...core.impact_models.presets import Preset, presets_of
 from ...core.impact_models.registry import MODELS, find_model
-from ..scene import model_parameters, models
+from ..scene.models import model_parameters, models
 from .reporting import reported
 
 _items: dict[str, list[tuple[str, str, str]]] = {}  # Blender does not keep the texts of a menu

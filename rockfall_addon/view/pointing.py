@@ -11,8 +11,10 @@ from mathutils import Vector
 from ...core.camera.model import project
 from ...core.errors import RockfallError
 from ...core.vectors import Array
-from ..scene import camera_paths, clicks, picks, pictures, places, store, videos
-from ..scene.places import Place
+from ..scene.footage import camera_paths, clicks, pictures, videos
+from ..scene.picks import picks, places
+from ..scene.picks.places import Place
+from ..scene.storage import store
 from . import image_view
 
 REACH_PX = 10.0

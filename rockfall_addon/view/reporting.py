@@ -9,7 +9,8 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import RockfallError, readable
-from ..scene import migration, problems, set_aside
+from ..scene import problems
+from ..scene.storage import migration, set_aside
 
 _answered: list[str] = []
 """The operator that is answering; one that it calls need not check again."""

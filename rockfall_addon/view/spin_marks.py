@@ -7,7 +7,8 @@ import numpy as np
 from ...core.camera.model import Camera, project
 from ...core.reconstruction.spin_phases import turned
 from ...core.vectors import Array
-from ..scene import clocks, pictures, spins
+from ..scene.footage import clocks, pictures
+from ..scene.picks import spins
 from .drawn import Drawing, Line, Mark, Path
 
 COLOUR = (1.0, 0.45, 0.85)

@@ -9,8 +9,10 @@ import numpy as np
 from mathutils import Matrix
 
 from ...core.analysis.graph_layout import Rectangle
-from ..scene import impact_marks, picks, problems, store
-from ..scene.impact_marks import Marks
+from ..scene import problems
+from ..scene.picks import impact_marks, picks
+from ..scene.picks.impact_marks import Marks
+from ..scene.storage import store
 from . import impact_words
 from .graphs import drawing
 from .graphs.look import Look, alpha, look, mixed

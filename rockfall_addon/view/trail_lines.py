@@ -14,7 +14,8 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 
 from ...core.vectors import Array
-from ..scene import materials, problems, store
+from ..scene import problems
+from ..scene.storage import materials, store
 from . import pointing
 
 WIDTH, FAINT = 2.5, 0.35  # [px at interface scale 1]; opacity of what the terrain hides

@@ -8,8 +8,9 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import RockfallError
-from ..scene import camera_paths, footage_blend, store, videos
+from ..scene.footage import camera_paths, footage_blend, videos
 from ..scene.next_step import ALIGN_TOOL, PICK_TOOL
+from ..scene.storage import store
 from . import image_view
 
 FILE = Path(__file__).parents[2] / "assets" / "workspace.blend"

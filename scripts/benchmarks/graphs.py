@@ -65,11 +65,11 @@ def case_graphs(window):
         assert bpy.ops.rockfall.open_graphs() == {"FINISHED"}
     yield 2.0
     scene = bpy.context.scene
-    comparison = window.part("rockfall_addon.scene.comparison")
+    comparison = window.part("rockfall_addon.scene.models.comparison")
     editor = window.part("rockfall_addon.view.graphs.editor")
     sheet = window.part("rockfall_addon.view.graphs.impact_sheet")
     find_courses = window.part("core.analysis.courses").find_courses
-    names = window.part("rockfall_addon.scene.models").ORDER[:MODELS]
+    names = window.part("rockfall_addon.scene.models.models").ORDER[:MODELS]
     demo = comparison.measured_of(scene).impacts
     area = window.area("NODE_EDITOR")
     region = next(one for one in area.regions if one.type == "WINDOW")

@@ -48,7 +48,10 @@ def case_picks(window):
     yield from window.wait_for(lambda: not arranging.is_waiting(), 60, "arranged")
     yield 2.0
     scene = bpy.context.scene
-    parts = {name: window.part(f"rockfall_addon.scene.{name}") for name in ("videos", "fingerprints", "sync")}
+    parts = {
+        name: window.part(f"rockfall_addon.scene.{room}.{name}")
+        for room, name in (("footage", "videos"), ("storage", "fingerprints"), ("footage", "sync"))
+    }
     parts["image_view"] = window.part("rockfall_addon.view.image_view")
     area = max((one for one in window.window.screen.areas if one.type == "VIEW_3D"), key=lambda one: one.width)
     region = next(one for one in area.regions if one.type == "WINDOW")
@@ -143,7 +146,7 @@ def case_memory(window):
         write_clip(clip)
         yield 0.5
         tell("  this script's clip written", ", OpenCV")
-        scene, parts = bpy.context.scene, window.part("rockfall_addon.scene.terrain")
+        scene, parts = bpy.context.scene, window.part("rockfall_addon.scene.terrain.terrain")
         started = time.perf_counter()
         add_slope(window, scene)
         taken = time.perf_counter() - started
@@ -164,8 +167,8 @@ def case_memory(window):
             yield 0.3
         yield 1.0
         tell("stepped through the clip", ", Blender's cache of pictures")
-        videos = window.part("rockfall_addon.scene.videos")
-        video_files = window.part("rockfall_addon.scene.video_files")
+        videos = window.part("rockfall_addon.scene.footage.videos")
+        video_files = window.part("rockfall_addon.scene.footage.video_files")
         camera = videos.active_camera(scene)
         for index in range(0, int(CLIP_S * RATE_HZ), 6):
             video_files.picture(camera, index)
@@ -185,7 +188,7 @@ def add_slope(window, scene) -> None:
     faces = np.stack([np.stack([a, b, d], 1), np.stack([a, d, c], 1)], axis=1).reshape(-1, 3)
     shift = window.part("core.georeference").GlobalShift()
     surface = window.part("core.terrain.surface").Surface(np.stack([x, y, z], -1).reshape(-1, 3), faces, shift, "slope")
-    window.part("rockfall_addon.scene.terrain").add_terrain(
+    window.part("rockfall_addon.scene.terrain.terrain").add_terrain(
         scene, surface, window.part("core.terrain.shading").shade(surface)
     )
 

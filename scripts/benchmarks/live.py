@@ -84,8 +84,13 @@ def main() -> None:
     bpy.context.preferences.addons.new().module = "rockfall"
     package.register()
     parts = {
-        name: importlib.import_module(f"rockfall.rockfall_addon.scene.{name}")
-        for name in ("sync", "picks", "reconstruction", "terrain")
+        name: importlib.import_module(f"rockfall.rockfall_addon.scene.{room}.{name}")
+        for room, name in (
+            ("footage", "sync"),
+            ("picks", "picks"),
+            ("picks", "reconstruction"),
+            ("terrain", "terrain"),
+        )
     }
     from rockfall.core.terrain.shading import shade
 

@@ -39,7 +39,10 @@ def falls(runs: int) -> object:
 
 
 def show(scene: bpy.types.Scene, runs: int) -> None:
-    simulation, paths = part("rockfall_addon.scene.simulation"), part("rockfall_addon.scene.simulated_paths")
+    simulation, paths = (
+        part("rockfall_addon.scene.simulation.simulation"),
+        part("rockfall_addon.scene.simulation.simulated_paths"),
+    )
     parabolas = falls(runs)
     lines = part("core.simulation.parabolas").polylines_of(parabolas, paths.LINE_TOLERANCE_M)
     figures = {name: np.ones(runs) for name in paths.FIGURES} | {"release": np.zeros(runs)}

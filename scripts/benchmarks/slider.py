@@ -176,9 +176,9 @@ def case_slider(window):
         assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
     yield 2.0
     scene = bpy.context.scene
-    comparison = window.part("rockfall_addon.scene.comparison")
+    comparison = window.part("rockfall_addon.scene.models.comparison")
     sheet = window.part("rockfall_addon.view.graphs.impact_sheet")
-    names = window.part("rockfall_addon.scene.models").ORDER[:MODELS]
+    names = window.part("rockfall_addon.scene.models.models").ORDER[:MODELS]
     scene.rockfall_comparison.models = {MODEL}
     yield 1.0  # its parameters are unfolded now, and stay so with other models
     scene.rockfall_comparison.models = {MODEL, *names}
@@ -216,12 +216,12 @@ def watch(window, parts: Parts) -> None:
     """Count Rockfall's functions, and Blender's evaluation, to the parts of a frame."""
     import bpy
 
-    comparison = window.part("rockfall_addon.scene.comparison")
+    comparison = window.part("rockfall_addon.scene.models.comparison")
     editor = window.part("rockfall_addon.view.graphs.editor")
     for module, name, part in (
         (comparison, "predictions_of", DATA),
         (comparison, "measured_of", DATA),
-        (window.part("rockfall_addon.scene.comparison_scores"), "ranking", DATA),
+        (window.part("rockfall_addon.scene.models.comparison_scores"), "ranking", DATA),
         (comparison, "_move_blocks", BLOCKS),
         (editor, "draw_content", GRAPHS),
     ):

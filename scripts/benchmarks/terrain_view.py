@@ -33,7 +33,7 @@ def measure(triangles: int) -> None:
     from rockfall.core.terrain.decimation import decimate
     from rockfall.core.terrain.raycast import cast_rays
     from rockfall.core.terrain.shading import Shading
-    from rockfall.rockfall_addon.scene import terrain, terrain_look, terrain_view
+    from rockfall.rockfall_addon.scene.terrain import terrain, terrain_look, terrain_view
 
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     rockfall.register()

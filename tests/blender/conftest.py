@@ -197,7 +197,7 @@ def part(rockfall: ModuleType, installation: Installation) -> Callable[[str], Mo
 @pytest.fixture
 def numbers(part) -> Callable[[bpy.types.Object], dict | None]:
     """``numbers(pick)["rn"]`` is what the pick's object keeps of its impact."""
-    return part("rockfall_addon.scene.impact_numbers").of
+    return part("rockfall_addon.scene.picks.impact_numbers").of
 
 
 @pytest.fixture
@@ -212,7 +212,7 @@ def scan(part) -> bpy.types.Scene:
     faces = np.vstack([ring[:, [0, 1, 2]], ring[:, [0, 2, 3]]]).astype(np.int32)
     shift = part("core.georeference").GlobalShift(2_600_000.0, 1_200_000.0, 0.0)
     surface = part("core.terrain.surface").Surface(np.column_stack([x, y, z]), faces, shift, "scan", ())
-    part("rockfall_addon.scene.terrain").add_terrain(
+    part("rockfall_addon.scene.terrain.terrain").add_terrain(
         bpy.context.scene, surface, part("core.terrain.shading").shade(surface)
     )
     return bpy.context.scene

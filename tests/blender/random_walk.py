@@ -128,7 +128,7 @@ class Walk:
         said, self.pushed = self.done[-1], self.done[-1][:60] if self.pushes else self.pushed
         if self.pushes and self.first_the_step:
             bpy.ops.ed.undo_push(message=self.pushed)
-        problems, sync = self.part("rockfall_addon.scene.problems"), self.part("rockfall_addon.scene.sync")
+        problems, sync = self.part("rockfall_addon.scene.problems"), self.part("rockfall_addon.scene.footage.sync")
         if self.first_the_step:
             for scene in bpy.data.scenes:
                 sync.touch(scene)

@@ -22,12 +22,12 @@ def scene(part):
 
 @pytest.fixture
 def aligned(part):
-    return part("rockfall_addon.scene.alignment")
+    return part("rockfall_addon.scene.footage.alignment")
 
 
 @pytest.fixture
 def pairs(part):
-    return part("rockfall_addon.scene.pairs")
+    return part("rockfall_addon.scene.footage.pairs")
 
 
 @pytest.fixture
@@ -56,16 +56,18 @@ def camera(part, scene, monkeypatch):
         one = video.open_video(FOOTAGE / "footage.mp4")
         _opened.update({field.name: getattr(one, field.name) for field in fields(one)})
     kept = video.Video(**_opened)
-    monkeypatch.setattr(part("rockfall_addon.scene.video_files"), "open_video", lambda path, **_: kept)
-    part("rockfall_addon.scene.georeference").write_shift(
+    monkeypatch.setattr(part("rockfall_addon.scene.footage.video_files"), "open_video", lambda path, **_: kept)
+    part("rockfall_addon.scene.terrain.georeference").write_shift(
         scene, part("core.georeference").GlobalShift(988400, 6375600, 0)
     )
-    return part("rockfall_addon.scene.new_videos").add_video(scene, FOOTAGE / "footage.mp4")
+    return part("rockfall_addon.scene.footage.new_videos").add_video(scene, FOOTAGE / "footage.mp4")
 
 
 @pytest.fixture
 def table(part, scene):
-    return part("core.exchange.cameras").read_pairs(PAIRS, part("rockfall_addon.scene.georeference").read_shift(scene))
+    return part("core.exchange.cameras").read_pairs(
+        PAIRS, part("rockfall_addon.scene.terrain.georeference").read_shift(scene)
+    )
 
 
 @pytest.fixture
@@ -80,7 +82,9 @@ def slope(part, scene):
         if axes[2][2] < 0:
             faces = faces[:, ::-1].copy()
         surface = part("core.terrain.surface").Surface(corners, faces, table.shift, "plane", ())
-        part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+        part("rockfall_addon.scene.terrain.terrain").add_terrain(
+            scene, surface, part("core.terrain.shading").shade(surface)
+        )
         return surface
 
     return make
@@ -104,7 +108,7 @@ def mark_all(marking, scene, camera, table, count) -> None:
 def test_imported_pairs_give_the_cores_camera(part, scene, aligned, camera, table) -> None:
     assert bpy.ops.rockfall.import_pairs(filepath=str(PAIRS)) == {"FINISHED"}
     found = solved_by_core(part, table)
-    moving = part("rockfall_addon.scene.camera_paths").camera_path(camera)
+    moving = part("rockfall_addon.scene.footage.camera_paths").camera_path(camera)
     np.testing.assert_allclose(moving.reference.position, found.camera.position, atol=1e-6)
     np.testing.assert_allclose(moving.reference.rotation, found.camera.rotation, atol=1e-9)
     assert moving.reference.fx == pytest.approx(found.camera.fx, rel=1e-9)
@@ -125,7 +129,7 @@ def test_the_poses_covariance_is_that_for_the_lens_as_found(part, scene, camera,
     """As the command line writes it; with the lens free the camera could back away while its focal length grows."""
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     found = solved_by_core(part, table)
-    kept = part("rockfall_addon.scene.camera_paths").pose_covariance(camera)
+    kept = part("rockfall_addon.scene.footage.camera_paths").pose_covariance(camera)
     np.testing.assert_allclose(kept, found.pose_covariance_given_lens, rtol=1e-6)
     along, free = (np.sqrt(np.trace(each[3:, 3:])) for each in (kept, found.pose_covariance))
     assert along < 0.5 * free
@@ -168,7 +172,7 @@ def test_solved_from_the_fifth_pair_on_and_predicted_from_then(
 ) -> None:
     surface = slope(table)
     mark_all(marking, scene, camera, table, 4)
-    assert not part("rockfall_addon.scene.camera_paths").is_solved(camera)
+    assert not part("rockfall_addon.scene.footage.camera_paths").is_solved(camera)
     assert "1 more" in aligned.hint(scene, camera)
     order = [4, 5, 7]
     for i in order:
@@ -177,13 +181,13 @@ def test_solved_from_the_fifth_pair_on_and_predicted_from_then(
             marking.move(scene, camera, pairs.open_pair(camera).id, "point", table.point[i])
         else:
             marking.mark(scene, camera, "point", table.point[i])
-    assert part("rockfall_addon.scene.camera_paths").is_solved(camera)
+    assert part("rockfall_addon.scene.footage.camera_paths").is_solved(camera)
     assert len([pair for pair in pairs.pairs_of(camera) if pair.is_complete]) == 7
     pair = marking.mark(scene, camera, "pixel", table.pixel[8])
     proposed = pairs.with_id(pairs.pairs_of(camera), pair)
     assert proposed.proposed == "point"
     assert not proposed.is_complete
-    moving = part("rockfall_addon.scene.camera_paths").camera_path(camera)
+    moving = part("rockfall_addon.scene.footage.camera_paths").camera_path(camera)
     np.testing.assert_allclose(
         part("core.camera.model").project(moving.reference, [proposed.point])[0], table.pixel[8], atol=1e-6
     )
@@ -214,7 +218,7 @@ def test_what_is_made_with_a_camera_of_five_pairs_says_so(part, scene, camera, m
     slope(table)
     for i in range(5):
         marking.mark(scene, camera, "pixel", table.pixel[i])
-        pair = part("rockfall_addon.scene.pairs").open_pair(camera)
+        pair = part("rockfall_addon.scene.footage.pairs").open_pair(camera)
         if pair.proposed:
             marking.move(scene, camera, pair.id, "point", table.point[i])
         else:
@@ -230,13 +234,13 @@ def test_what_is_made_with_a_camera_of_five_pairs_says_so(part, scene, camera, m
     bpy.ops.rockfall.export_camera(filepath=str(tmp_path / "camera.toml"))
     written = part("core.exchange.cameras").read_camera(tmp_path / "camera.toml").quality
     assert (written.pairs, written.redundancy) == (5, 3)
-    view = part("rockfall_addon.scene.sightings").view_of(camera)
+    view = part("rockfall_addon.scene.footage.sightings").view_of(camera)
     np.testing.assert_array_equal(view.camera_covariance, written.covariance)
     found = solved_by_core(part, table, slice(0, 5))
     np.testing.assert_allclose(view.camera_covariance, found.whole, rtol=0.02, atol=1e-9)
     bpy.ops.rockfall.import_camera(filepath=str(tmp_path / "camera.toml"))
     assert rests in part("rockfall_addon.scene.next_step").next_step(scene).sentence
-    placed = part("rockfall_addon.scene.camera_paths").camera_path(camera).reference
+    placed = part("rockfall_addon.scene.footage.camera_paths").camera_path(camera).reference
     part("rockfall_addon.steps.alignment.solving").place_by_eye(scene, camera, placed)
     assert rests not in part("rockfall_addon.scene.next_step").next_step(scene).sentence
 
@@ -249,13 +253,13 @@ def test_known_focal_length_needs_four_pairs(part, scene, marking, camera, table
     for i in rows:
         marking.mark(scene, camera, "pixel", table.pixel[i])
         marking.mark(scene, camera, "point", table.point[i])
-    moving = part("rockfall_addon.scene.camera_paths").camera_path(camera)
-    assert part("rockfall_addon.scene.camera_paths").is_solved(camera)
+    moving = part("rockfall_addon.scene.footage.camera_paths").camera_path(camera)
+    assert part("rockfall_addon.scene.footage.camera_paths").is_solved(camera)
     assert moving.reference.fx == 2100.0
     assert settings.focal_mm == pytest.approx(43.2666 * 2100 / np.hypot(1280, 720), rel=1e-5)
     before = moving.reference.position
     settings.focal_px = 2150.0
-    after = part("rockfall_addon.scene.camera_paths").camera_path(camera).reference
+    after = part("rockfall_addon.scene.footage.camera_paths").camera_path(camera).reference
     assert after.fx == 2150.0
     assert np.linalg.norm(after.position - before) > 0.5, "the camera has gone back"
 
@@ -303,7 +307,7 @@ def test_bad_pairs_in_words(part, scene, aligned, pairs, marking, camera, table)
         marking.mark(scene, camera, "pixel", table.pixel[i])
         marking.mark(scene, camera, "point", line[i])
     assert "line" in aligned.solution_of(camera).problem
-    assert not part("rockfall_addon.scene.camera_paths").is_solved(camera)
+    assert not part("rockfall_addon.scene.footage.camera_paths").is_solved(camera)
     marking.delete(scene, camera, [pair.id for pair in pairs.pairs_of(camera)])
     assert "rockfall_pairs" not in camera
     assert len(camera.rockfall_alignment.rows) == 0
@@ -312,11 +316,14 @@ def test_bad_pairs_in_words(part, scene, aligned, pairs, marking, camera, table)
 def test_file_keeps_the_doubles(part, scene, aligned, pairs, camera, table, tmp_path) -> None:
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     kept, lens = repr(pairs.pairs_of(camera)), aligned.lens_of(camera).tolist()
-    pose = part("rockfall_addon.scene.camera_paths").camera_path(camera).reference.position.tolist()
+    pose = part("rockfall_addon.scene.footage.camera_paths").camera_path(camera).reference.position.tolist()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "aligned.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "aligned.blend"), load_ui=False)
-    videos, camera_paths = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.camera_paths")
+    videos, camera_paths = (
+        part("rockfall_addon.scene.footage.videos"),
+        part("rockfall_addon.scene.footage.camera_paths"),
+    )
     again = videos.active_camera(bpy.context.scene)
     assert repr(pairs.pairs_of(again)) == kept
     assert aligned.lens_of(again).tolist() == lens
@@ -334,7 +341,7 @@ def test_pairs_and_camera_go_through_files(part, scene, aligned, pairs, camera, 
     assert again.frame.tolist() == [0] * 14
     assert bpy.ops.rockfall.export_camera(filepath=str(tmp_path / "camera.toml")) == {"FINISHED"}
     file = part("core.exchange.cameras").read_camera(tmp_path / "camera.toml", table.shift)
-    camera_paths = part("rockfall_addon.scene.camera_paths")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
     solved = camera_paths.camera_path(camera).reference
     np.testing.assert_allclose(file.path.reference.position, solved.position, atol=1e-8)
     assert file.rmse_px == pytest.approx(aligned.solution_of(camera).rmse_px)
@@ -372,7 +379,7 @@ def test_a_camera_and_its_pairs_are_written_together(part, scene, camera, tmp_pa
 
 def test_a_marked_pair_can_be_taken_back(part, scene, aligned, marking, pairs, solving, camera, table) -> None:
     """Pairs, solution, lens and place of the camera are as before, whether it was solved or not."""
-    camera_paths = part("rockfall_addon.scene.camera_paths")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
 
     def state() -> tuple:
         path, lens = camera_paths.camera_path(camera), camera.data
@@ -427,14 +434,14 @@ def test_camera_that_is_gone(part, scene, aligned, marking, camera) -> None:
 
 
 def test_video_that_has_moved(part, scene, aligned, table, tmp_path) -> None:
-    part("rockfall_addon.scene.georeference").write_shift(scene, table.shift)
+    part("rockfall_addon.scene.terrain.georeference").write_shift(scene, table.shift)
     file = tmp_path / "clip.mp4"
     shutil.copy(FOOTAGE / "footage.mp4", file)
-    camera = part("rockfall_addon.scene.new_videos").add_video(scene, file)
+    camera = part("rockfall_addon.scene.footage.new_videos").add_video(scene, file)
     bpy.ops.rockfall.import_pairs(filepath=str(PAIRS))
     assert aligned.solution_of(camera).rmse_px < 0.5
     file.unlink()
-    part("rockfall_addon.scene.video_files").forget_files()
+    part("rockfall_addon.scene.footage.video_files").forget_files()
     camera.rockfall_alignment.motion = "ROTATION"
     with pytest.raises(RuntimeError, match=r"clip\.mp4"):
         bpy.ops.rockfall.follow_background()
@@ -454,7 +461,7 @@ def test_hand_held_camera_is_followed_and_corrected(
         bpy.ops.rockfall.follow_background()
     camera.rockfall_alignment.motion = "ROTATION"
     assert bpy.ops.rockfall.follow_background() == {"FINISHED"}
-    camera_paths = part("rockfall_addon.scene.camera_paths")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
     known = following.followed(camera)
     assert (known["reference"], known["frames"]) == (0, 300)
     assert not following.is_stale(camera)

@@ -21,12 +21,12 @@ def other(part, tmp_path: Path) -> Path:
     module.write_project(tmp_path)
     assert bpy.ops.rockfall.open_project(filepath=str(tmp_path / "project.toml")) == {"FINISHED"}
     bpy.context.scene.rockfall_picking.trajectory = "A"
-    own = part("rockfall_addon.scene.own_blocks")
+    own = part("rockfall_addon.scene.picks.own_blocks")
     own.give(bpy.context.scene, "A", part("core.reconstruction.block").Block(0.9, 0.8, 0.7, 2500.0))
-    part("rockfall_addon.scene.sync").sync(bpy.context.scene)
+    part("rockfall_addon.scene.footage.sync").sync(bpy.context.scene)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "other.blend"), copy=True)
     own.take(bpy.context.scene, "A")
-    part("rockfall_addon.scene.sync").sync(bpy.context.scene)
+    part("rockfall_addon.scene.footage.sync").sync(bpy.context.scene)
     return tmp_path / "other.blend"
 
 
@@ -58,7 +58,7 @@ def test_an_appended_run_is_a_run_of_its_own(part, other: Path) -> None:
     assert len(new) == 6
     (block,), (flights,) = of_role("block", "A (2)"), of_role("flights", "A (2)")
     assert flights["rockfall_mass_kg"] == pytest.approx(2500 * 0.9 * 0.8 * 0.7 * 3.14159265 / 6)
-    states = part("rockfall_addon.scene.block_keys").states_of(block)
+    states = part("rockfall_addon.scene.picks.block_keys").states_of(block)
     assert set(states) == {obj["rockfall_id"] for obj in new}, "the keys are those of its own picks"
     assert "went wrong" not in said(part)
 
@@ -69,7 +69,7 @@ def test_appended_picks_join_the_run_of_their_name(part, other: Path) -> None:
     gone = sorted(of_role("pick", "A"), key=lambda obj: obj["rockfall_time_s"])[2]
     name, was = gone.name, state(gone)
     bpy.data.objects.remove(gone)
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     bpy.ops.wm.append(directory=folder_of(other, "Object"), filename=name)
     assert len(of_role("pick", "A")) == 6
     assert was in [state(obj) for obj in of_role("pick", "A")]
@@ -81,14 +81,14 @@ def test_what_is_linked_is_not_written_to(part, other: Path, tmp_path: Path) -> 
     linked = [obj for obj in bpy.data.objects if obj.library is not None]
     assert any(obj.get("rockfall_role") == "pick" for obj in linked)
     held = {obj.name: {key: str(value) for key, value in obj.items()} for obj in linked}
-    sync, picks = part("rockfall_addon.scene.sync"), part("rockfall_addon.scene.picks")
+    sync, picks = part("rockfall_addon.scene.footage.sync"), part("rockfall_addon.scene.picks.picks")
     sync.sync(bpy.context.scene, again=True)
     assert sorted(map(str, map(state, picks.objects_of(bpy.context.scene)))) == before
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "walk.blend"))
     assert {obj.name: {key: str(value) for key, value in obj.items()} for obj in linked} == held
     assert "are linked from other.blend, and not used" in said(part)
     bpy.context.view_layer.objects.active = next(obj for obj in linked if obj.get("rockfall_role") == "pick")
-    assert part("rockfall_addon.scene.impact_rows").selected(bpy.context) is None
+    assert part("rockfall_addon.scene.picks.impact_rows").selected(bpy.context) is None
 
 
 def test_a_linked_scene_is_left_alone(part, other: Path) -> None:
@@ -96,7 +96,7 @@ def test_a_linked_scene_is_left_alone(part, other: Path) -> None:
         wanted.scenes = ["Scene"]
     (scene,) = [each for each in bpy.data.scenes if each.library is not None]
     before = {key: str(value) for key, value in scene.items()}
-    done = part("rockfall_addon.scene.sync").sync(scene, again=True)
+    done = part("rockfall_addon.scene.footage.sync").sync(scene, again=True)
     assert not done.rebuilt
     bpy.context.window.scene = scene
     with pytest.raises(RuntimeError, match="linked from another file"):
@@ -112,13 +112,13 @@ def test_a_scene_of_its_own_stays_as_it_was(part, other: Path) -> None:
     (new,) = [each for each in bpy.data.scenes if each != bpy.context.scene]
     new.render.fps = 60
     for scene in bpy.data.scenes:
-        part("rockfall_addon.scene.sync").sync(scene, again=True)
+        part("rockfall_addon.scene.footage.sync").sync(scene, again=True)
     for scene in bpy.data.scenes:
         found = sorted(str(state(obj)) for obj in scene.objects if obj.get("rockfall_role") == "pick")
         assert found == before
         for obj in (one for one in scene.objects if one.get("rockfall_role") == "pick"):
             frames = obj["rockfall_key_frame"] / scene.render.fps
-            offset = part("rockfall_addon.scene.timing").kept_offsets(scene)[obj["rockfall_trajectory"]]
+            offset = part("rockfall_addon.scene.footage.timing").kept_offsets(scene)[obj["rockfall_trajectory"]]
             assert frames + offset == pytest.approx(obj["rockfall_time_s"], abs=1e-4)
     assert "counts one unit as one metre" in said(part)
 
@@ -126,8 +126,8 @@ def test_a_scene_of_its_own_stays_as_it_was(part, other: Path) -> None:
 def test_appended_clicks_know_their_own_video(part, tmp_path: Path) -> None:
     """A camera that comes a second time gets another id; the picks that come with it follow."""
     scene = bpy.context.scene
-    camera = part("rockfall_addon.scene.new_videos").add_video(scene, DATA / "constant.mp4")
-    pick = part("rockfall_addon.scene.picks").add_pick(scene, "A", 1.0, (1.0, 2.0, 3.0))
+    camera = part("rockfall_addon.scene.footage.new_videos").add_video(scene, DATA / "constant.mp4")
+    pick = part("rockfall_addon.scene.picks.picks").add_pick(scene, "A", 1.0, (1.0, 2.0, 3.0))
     pick["rockfall_seen"] = {"position": list(pick["rockfall_position_m"]), camera["rockfall_id"]: {"frame": 3}}
     file = tmp_path / "other.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(file), copy=True)

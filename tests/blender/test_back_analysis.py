@@ -40,7 +40,7 @@ def analysed(scene) -> dict:
 
 def draw_panel(part) -> list[str]:
     """Texts of the panel's result, as a stand-in for a layout is told."""
-    kept = part("rockfall_addon.scene.posterior").kept_of(bpy.context.scene)
+    kept = part("rockfall_addon.scene.simulation.posterior").kept_of(bpy.context.scene)
     return [] if kept is None else [row.name for row in kept.rows]
 
 
@@ -75,7 +75,7 @@ def test_the_observed_runs_alone_stand_beside_the_verdict(part, scene) -> None:
 
 
 def test_what_is_stated_of_the_record_goes_into_the_question_and_the_project(part, scene, tmp_path: Path) -> None:
-    analysis = part("rockfall_addon.scene.back_analysis")
+    analysis = part("rockfall_addon.scene.simulation.back_analysis")
     settings = scene.rockfall_back_analysis
     assert analysis.ask(scene).completeness.text == ""
     for chosen, falls, text in (("COMPLETE", 0, "complete"), ("UNKNOWN", 0, "unknown"), ("LONGEST", 0, "longest"),
@@ -93,7 +93,10 @@ def test_what_is_stated_of_the_record_goes_into_the_question_and_the_project(par
 
 
 def test_blocks_draw_from_it_when_they_are_told_to(part, scene) -> None:
-    setup, posterior = part("rockfall_addon.scene.simulation_setup"), part("rockfall_addon.scene.posterior")
+    setup, posterior = (
+        part("rockfall_addon.scene.simulation.simulation_setup"),
+        part("rockfall_addon.scene.simulation.posterior"),
+    )
     kept = analysed(scene)
     assert setup.plan(scene).scenario.draws == {}
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
@@ -131,15 +134,20 @@ def test_it_goes_with_the_project_and_comes_back(part, scene, tmp_path: Path) ->
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     assert bpy.ops.rockfall.open_project(filepath=str(tmp_path / "project.toml")) == {"FINISHED"}
     scene = bpy.context.scene
-    found = part("rockfall_addon.scene.posterior").kept_of(scene)
+    found = part("rockfall_addon.scene.simulation.posterior").kept_of(scene)
     np.testing.assert_array_equal(found.draws.values, kept["values"])
     assert scene.rockfall_back_analysis.draw
     assert [row.median for row in found.rows] == pytest.approx([row[2] for row in kept["rows"]], rel=0.02)
-    assert not part("rockfall_addon.scene.back_analysis").is_stale(scene, found), "nobody knows what it was of"
+    assert not part("rockfall_addon.scene.simulation.back_analysis").is_stale(scene, found), (
+        "nobody knows what it was of"
+    )
 
 
 def test_it_is_old_when_the_picks_have_changed(part, scene) -> None:
-    analysis, posterior = part("rockfall_addon.scene.back_analysis"), part("rockfall_addon.scene.posterior")
+    analysis, posterior = (
+        part("rockfall_addon.scene.simulation.back_analysis"),
+        part("rockfall_addon.scene.simulation.posterior"),
+    )
     analysed(scene)
     assert not analysis.is_stale(scene, posterior.kept_of(scene))
     scene.rockfall_back_analysis.names = f"{MODEL}.rn"
@@ -150,7 +158,7 @@ def test_it_is_old_when_the_picks_have_changed(part, scene) -> None:
     scene.rockfall_simulation.rolling = "azzoni_1995"
     pick = next(obj for obj in scene.objects if obj.get("rockfall_role") == "pick")
     pick.location.x += 0.3
-    part("rockfall_addon.scene.sync").recompute(scene)
+    part("rockfall_addon.scene.footage.sync").recompute(scene)
     assert analysis.is_stale(scene, posterior.kept_of(scene))
 
 
@@ -175,7 +183,10 @@ def seen(part, scene, tmp_path: Path) -> tuple[Path, Path]:
 
 
 def test_stops_of_a_table_say_the_same_as_on_the_command_line(part, scene, seen, tmp_path: Path) -> None:
-    analysis, posterior = part("rockfall_addon.scene.back_analysis"), part("rockfall_addon.scene.posterior")
+    analysis, posterior = (
+        part("rockfall_addon.scene.simulation.back_analysis"),
+        part("rockfall_addon.scene.simulation.posterior"),
+    )
     table, stops = seen
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     assert bpy.ops.rockfall.import_terrain(filepath=str(DEMO / "terrain.ply")) == {"FINISHED"}
@@ -242,7 +253,10 @@ def test_bad_tables_are_named(scene, seen, tmp_path: Path, source: str, rows: st
 
 
 def test_the_scene_and_tables_together_with_sections_of_ones_own(part, scene, seen, monkeypatch) -> None:
-    analysis, posterior = part("rockfall_addon.scene.back_analysis"), part("rockfall_addon.scene.posterior")
+    analysis, posterior = (
+        part("rockfall_addon.scene.simulation.back_analysis"),
+        part("rockfall_addon.scene.simulation.posterior"),
+    )
     settings, asked = scene.rockfall_back_analysis, []
     real = part("core.workflow.back_analysis").back_analyse
     monkeypatch.setattr(analysis, "back_analyse", lambda *given, **how: asked.append(given) or real(*given, **how))
@@ -250,8 +264,8 @@ def test_the_scene_and_tables_together_with_sections_of_ones_own(part, scene, se
     picks = [obj for obj in scene.objects if obj.get("rockfall_role") == "pick"]
     x, y, z = np.mean([obj.location for obj in picks], axis=0)
     ends = [np.array([x, y - 20, z]), np.array([x, y + 20, z])]
-    screen = part("rockfall_addon.scene.screens").make(scene, ends, "Road")
-    top = max(obj.location.z for obj in picks) + part("rockfall_addon.scene.georeference").read_shift(scene).z
+    screen = part("rockfall_addon.scene.simulation.screens").make(scene, ends, "Road")
+    top = max(obj.location.z for obj in picks) + part("rockfall_addon.scene.terrain.georeference").read_shift(scene).z
     settings.contours, settings.drops, settings.at_screens = f"{top - 6:.1f}", "4, 8", True
     kept = analysed(scene)
     n = len(seen[1].read_text().splitlines()) - 1
@@ -286,7 +300,7 @@ def test_medians_become_the_values(part, scene) -> None:
     kept = analysed(scene)
     scene.rockfall_back_analysis.draw = True
     assert bpy.ops.rockfall.use_medians() == {"FINISHED"}
-    own = part("rockfall_addon.scene.models").parameters_of(scene)[MODEL]
+    own = part("rockfall_addon.scene.models.models").parameters_of(scene)[MODEL]
     assert own["rn"] == pytest.approx(kept["rows"][0][2], rel=1e-3)
     assert scene.rockfall_simulation.friction == pytest.approx(kept["rows"][2][2], rel=1e-3)
     assert not scene.rockfall_back_analysis.draw
@@ -296,7 +310,7 @@ def test_medians_become_the_values(part, scene) -> None:
 
 
 def test_parameters_are_chosen_and_bad_laws_refused(part, scene) -> None:
-    analysis = part("rockfall_addon.scene.back_analysis")
+    analysis = part("rockfall_addon.scene.simulation.back_analysis")
     assert analysis.fitted_names(scene, MODEL) == ("rn", "rt", "friction")
     assert bpy.ops.rockfall.choose_back_analysed(model=MODEL, parameter="rt") == {"FINISHED"}
     assert analysis.fitted_names(scene, MODEL) == ("rn", "friction")
@@ -327,10 +341,10 @@ def test_a_damaged_one_is_set_aside_and_named(part, scene, tmp_path: Path, chang
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
     scene = bpy.context.scene
     assert KEY not in scene
-    said = [str(one) for one in part("rockfall_addon.scene.set_aside_words").grave(scene)]
+    said = [str(one) for one in part("rockfall_addon.scene.storage.set_aside_words").grave(scene)]
     said += [str(one) for one in part("rockfall_addon.scene.problems").remarks(scene)] if not said else []
     assert any("analyse again" in sentence for sentence in said), said
-    assert part("rockfall_addon.scene.simulation_setup").plan(scene).scenario.draws == {}
+    assert part("rockfall_addon.scene.simulation.simulation_setup").plan(scene).scenario.draws == {}
 
 
 @pytest.mark.parametrize(
@@ -350,7 +364,10 @@ def test_a_damaged_one_is_set_aside_and_named(part, scene, tmp_path: Path, chang
     ],
 )
 def test_what_is_kept_is_set_aside_where_it_cannot_be_shown(part, scene, damage) -> None:
-    posterior, values = part("rockfall_addon.scene.posterior"), part("rockfall_addon.scene.stored_values")
+    posterior, values = (
+        part("rockfall_addon.scene.simulation.posterior"),
+        part("rockfall_addon.scene.storage.stored_values"),
+    )
     draws = part("core.simulation.parameter_draws").ParameterDraws(("rn",), np.array([[0.3], [0.35]]), np.ones(2))
     posterior.keep(scene, MODEL, draws)
     check, _ = values.OF_THE_SCENE[KEY]
@@ -360,11 +377,14 @@ def test_what_is_kept_is_set_aside_where_it_cannot_be_shown(part, scene, damage)
 
 
 def test_a_screen_that_is_no_line_any_more_stops_the_question_and_not_the_panel(part, scene) -> None:
-    analysis, posterior = part("rockfall_addon.scene.back_analysis"), part("rockfall_addon.scene.posterior")
+    analysis, posterior = (
+        part("rockfall_addon.scene.simulation.back_analysis"),
+        part("rockfall_addon.scene.simulation.posterior"),
+    )
     middle = np.mean([obj.location for obj in scene.objects if obj.get("rockfall_role") == "pick"], axis=0)
     aside = np.array([0.0, 20.0, 0.0])
     line = [middle - aside, middle + aside]
-    screen = part("rockfall_addon.scene.screens").make(scene, line, "Road")
+    screen = part("rockfall_addon.scene.simulation.screens").make(scene, line, "Road")
     scene.rockfall_back_analysis.at_screens = True
     analysed(scene)
     assert not analysis.is_stale(scene, posterior.kept_of(scene))

@@ -25,7 +25,9 @@ def scene(part, tmp_path: Path) -> bpy.types.Scene:
     faces = np.vstack([ring[:, [0, 1, 2]], ring[:, [0, 2, 3]]]).astype(np.int32)
     shift = part("core.georeference").GlobalShift()
     surface = part("core.terrain.surface").Surface(np.column_stack([x, y, -SLOPE * x]), faces, shift, "plane", ())
-    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    part("rockfall_addon.scene.terrain.terrain").add_terrain(
+        scene, surface, part("core.terrain.shading").shade(surface)
+    )
     import_picks(tmp_path, [("A", 0.0, 0.0), ("B", 30.0, 3.0)])
     scene.rockfall_comparison.models = TWO
     return scene
@@ -44,7 +46,7 @@ def import_picks(folder: Path, runs: list[tuple[str, float, float]]) -> None:
 
 @pytest.fixture
 def comparison_of(part):
-    return part("rockfall_addon.scene.comparison").comparison_of
+    return part("rockfall_addon.scene.models.comparison").comparison_of
 
 
 def picks(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -75,7 +77,7 @@ def test_models_meet_the_scenes_impacts_as_rockfall_compare_has_them(scene, part
 
 
 def test_each_row_leads_back_to_its_pick(scene, part, comparison_of) -> None:
-    found, with_id = comparison_of(scene), part("rockfall_addon.scene.picks").with_id
+    found, with_id = comparison_of(scene), part("rockfall_addon.scene.picks.picks").with_id
     for row, identifier in enumerate(found.pick):
         obj = with_id(scene, identifier)
         assert obj["rockfall_trajectory"] == found.impacts.trajectory[row]
@@ -116,7 +118,7 @@ def test_it_follows_a_moved_pick_and_a_setting(scene, part, comparison_of) -> No
     pick = next(obj for obj in picks(scene) if obj["rockfall_time_s"] == TIMES[1])
     pick.location.x += 0.5
     pick.location.z -= 0.5 * SLOPE
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     second = comparison_of(scene)
     assert second.version != first.version
     row = second.pick.index(pick["rockfall_id"])
@@ -130,7 +132,7 @@ def test_it_follows_a_moved_pick_and_a_setting(scene, part, comparison_of) -> No
 
 def test_a_trajectory_with_a_problem_leaves_the_others(scene, part, comparison_of) -> None:
     scene.objects["B impact 1"]["rockfall_time_s"] = scene.objects["B impact 2"]["rockfall_time_s"]
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     found = comparison_of(scene)
     assert set(found.impacts.trajectory.tolist()) == {"A"}
     assert len(found.problems) == 1
@@ -159,7 +161,7 @@ def test_one_impact_alone(part, comparison_of, tmp_path: Path) -> None:
 def test_all_impacts_flagged(scene, part, comparison_of) -> None:
     for obj in picks(scene):
         obj["rockfall_status"] = "discarded"
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     found = comparison_of(scene)
     assert found.predictions == {"A": {}}
     assert found.problems
@@ -180,7 +182,7 @@ def test_parameters_out_of_range_are_told(scene, part, comparison_of) -> None:
 
 
 def test_the_second_set_beside_the_first(scene, part, comparison_of) -> None:
-    models = part("rockfall_addon.scene.models")
+    models = part("rockfall_addon.scene.models.models")
     models.keep_parameters(scene, {"noel_2017": {"rt": 1 / 3}}, "B")
     assert list(comparison_of(scene).predictions) == ["A"]
     scene.rockfall_comparison.sets = "BOTH"
@@ -201,14 +203,14 @@ def test_what_a_point_of_a_model_is(scene, comparison_of) -> None:
 
 
 def test_both_sets_of_parameters_go_out_and_come_in(scene, part, tmp_path: Path) -> None:
-    models = part("rockfall_addon.scene.models")
+    models = part("rockfall_addon.scene.models.models")
     import_picks(tmp_path, [(name, 30.0 * i, 3.0 * i) for i, name in enumerate("ABCD")])
     scene.rockfall_parameters.noel_2017.rt = 0.5
     scene.rockfall_other_parameters.noel_2017.rt = 0.7
     scene.rockfall_comparison.fitted = "wyllie_2014"
     sets = {which: models.parameters_of(scene, which) for which in "AB"}
     assert sets == {"A": {"noel_2017": {"rt": 0.5}}, "B": {"noel_2017": {"rt": 0.7}}}
-    fit, store = part("rockfall_addon.scene.fit"), part("rockfall_addon.scene.store")
+    fit, store = part("rockfall_addon.scene.models.fit"), part("rockfall_addon.scene.storage.store")
     question = fit.ask(scene)
     fit.keep(
         scene,
@@ -231,7 +233,7 @@ def test_both_sets_of_parameters_go_out_and_come_in(scene, part, tmp_path: Path)
 def test_a_moved_pick_has_its_own_trajectory_reconstructed_alone(
     scene, part, comparison_of, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    first, reconstruction = comparison_of(scene).impacts, part("rockfall_addon.scene.reconstruction")
+    first, reconstruction = comparison_of(scene).impacts, part("rockfall_addon.scene.picks.reconstruction")
     asked, kept = [], reconstruction.reconstruct_scene
 
     def counted(scene, picks=None, surface=None):
@@ -242,7 +244,7 @@ def test_a_moved_pick_has_its_own_trajectory_reconstructed_alone(
     pick = next(obj for obj in picks(scene) if obj["rockfall_trajectory"] == "A" and obj["rockfall_time_s"] == TIMES[1])
     pick.location.x += 0.5
     pick.location.z -= 0.5 * SLOPE
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     monkeypatch.setattr(reconstruction, "reconstruct_scene", counted)
     second = comparison_of(scene).impacts
     assert asked == [{"A"}]
@@ -253,13 +255,13 @@ def test_a_moved_pick_has_its_own_trajectory_reconstructed_alone(
     assert not np.array_equal(second.v1[:3], first.v1[:3], equal_nan=True)
     for obj in [obj for obj in picks(scene) if obj["rockfall_trajectory"] == "A"]:
         bpy.data.objects.remove(obj)
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     assert comparison_of(scene).impacts.trajectory.tolist() == ["B"] * 3
     assert asked == [{"A"}]
 
 
 def test_graphs_do_not_wait_for_a_model_that_is_being_prepared(scene, part, comparison_of) -> None:
-    preparation = part("rockfall_addon.scene.preparation")
+    preparation = part("rockfall_addon.scene.picks.preparation")
     preparation.begin(["wyllie_2014", "stevens_1998"])
     try:
         first = comparison_of(scene)

@@ -17,7 +17,7 @@ def scene(part, tmp_path: Path) -> bpy.types.Scene:
     corners = np.array([[-50.0, -50, 0], [150, -50, 0], [150, 150, 0], [-50, 150, 0]])
     faces, shift = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32), part("core.georeference").GlobalShift()
     plain = part("core.terrain.surface").Surface(corners, faces, shift, "plain", ())
-    part("rockfall_addon.scene.terrain").add_terrain(
+    part("rockfall_addon.scene.terrain.terrain").add_terrain(
         bpy.context.scene, plain, part("core.terrain.shading").shade(plain)
     )
     rows, rng = ["trajectory,time_s,x_m,y_m,z_m,kind"], np.random.default_rng(4)
@@ -42,12 +42,12 @@ def scene(part, tmp_path: Path) -> bpy.types.Scene:
 
 @pytest.fixture
 def models(part):
-    return part("rockfall_addon.scene.models")
+    return part("rockfall_addon.scene.models.models")
 
 
 @pytest.fixture
 def comparison_of(part):
-    return part("rockfall_addon.scene.comparison").comparison_of
+    return part("rockfall_addon.scene.models.comparison").comparison_of
 
 
 def impacts_table(folder: Path, part, comparison, name: str, site: str) -> Path:
@@ -209,12 +209,12 @@ def test_a_fit_that_is_discarded_leaves_nothing(scene, models) -> None:
 
 
 def test_a_fit_says_that_picks_have_changed_since(scene, part) -> None:
-    proposal_of = part("rockfall_addon.scene.fit").proposal_of
+    proposal_of = part("rockfall_addon.scene.models.fit").proposal_of
     bpy.ops.rockfall.calibrate()
     assert not proposal_of(scene).stale
     pick = next(obj for obj in scene.objects if obj.get("rockfall_kind") == "impact")
     pick["rockfall_time_s"] += 0.01
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     assert "have changed since" in proposal_of(scene).stale
 
 
@@ -243,14 +243,14 @@ def test_scores_are_those_of_rockfall_compare(scene, part, comparison_of) -> Non
         scene.rockfall_comparison.quantity = quantity
         for measure in ("rmse", "energy_distance"):
             scene.rockfall_comparison.measure = measure
-            rows = part("rockfall_addon.scene.comparison_scores").ranking(scene, comparison_of(scene))
+            rows = part("rockfall_addon.scene.models.comparison_scores").ranking(scene, comparison_of(scene))
             values = [getattr(row.score, measure) for row in rows]
             assert values == sorted(values)
             assert len(rows) == 3
             for row in rows:
                 one = wanted[row.model, quantity]
                 assert (row.score.bias, row.score.rmse) == (pytest.approx(one.bias), pytest.approx(one.rmse))
-                rmse_of = part("rockfall_addon.scene.comparison_scores").rmse_of
+                rmse_of = part("rockfall_addon.scene.models.comparison_scores").rmse_of
                 assert rmse_of(comparison_of(scene), "A", row.model, quantity) == pytest.approx(one.rmse)
                 assert getattr(row.score, measure) == pytest.approx(getattr(one, measure), abs=1e-9)
 
@@ -273,7 +273,7 @@ def test_impacts_of_another_site_are_shown_kept_and_missed(scene, part, comparis
     elsewhere = tmp_path / "moved"
     elsewhere.mkdir()
     path.rename(elsewhere / "other.csv")
-    part("rockfall_addon.scene.databases").LOOK_AGAIN_S = 0.0
+    part("rockfall_addon.scene.storage.databases").LOOK_AGAIN_S = 0.0
     (gone,) = comparison_of(scene).others
     assert gone.impacts is None
     assert "is not there" in gone.problem
@@ -285,7 +285,7 @@ def test_impacts_of_another_site_are_shown_kept_and_missed(scene, part, comparis
 def test_a_table_that_has_changed_is_told(scene, part, comparison_of, tmp_path: Path) -> None:
     path = impacts_table(tmp_path, part, comparison_of(scene), "other.csv", "Gully")
     bpy.ops.rockfall.add_database(filepath=str(path))
-    part("rockfall_addon.scene.databases").LOOK_AGAIN_S = 0.0
+    part("rockfall_addon.scene.storage.databases").LOOK_AGAIN_S = 0.0
     assert not comparison_of(scene).others[0].problem
     lines = path.read_text(encoding="utf-8").splitlines()
     path.write_text("\n".join(lines[:-2]) + "\n", encoding="utf-8")
@@ -319,7 +319,7 @@ def test_a_fit_can_take_the_impacts_of_other_sites(scene, part, comparison_of, t
     bpy.ops.rockfall.add_database(
         filepath=str(impacts_table(tmp_path, part, comparison_of(scene), "other.csv", "Gully"))
     )
-    proposal_of = part("rockfall_addon.scene.fit").proposal_of
+    proposal_of = part("rockfall_addon.scene.models.fit").proposal_of
     bpy.ops.rockfall.calibrate()
     alone = proposal_of(scene).impacts
     assert alone <= own

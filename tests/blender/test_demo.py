@@ -7,7 +7,7 @@ import numpy as np
 
 def test_load_demo(part) -> None:
     assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
-    state = part("rockfall_addon.scene.store")
+    state = part("rockfall_addon.scene.storage.store")
     scene = bpy.context.scene
     (ground,) = state.with_role(scene, "terrain")
     assert 250_000 < len(ground.data.polygons) < 350_000
@@ -16,7 +16,7 @@ def test_load_demo(part) -> None:
     impacts = [p for p in picks if "rockfall_result" in p]
     assert 90 <= len(impacts) <= 115
     # the picks lie on the slope that is shown
-    surface = part("rockfall_addon.scene.terrain").surface_of(ground)
+    surface = part("rockfall_addon.scene.terrain.terrain").surface_of(ground)
     places = np.array([p["rockfall_position_m"] for p in impacts])
     distance = part("core.terrain.raycast").closest_points(surface, places).distance
     assert np.median(distance) < 0.05

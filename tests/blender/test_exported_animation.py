@@ -199,7 +199,7 @@ def test_the_scene_exports_what_it_shows(slope: bpy.types.Scene, part, tmp_path:
     origin = np.array(
         next(node for node in content["nodes"] if node["name"] == "Rockfall")["extras"]["survey_origin_m"]
     )
-    result = part("rockfall_addon.scene.reconstruction").reconstruct_good(slope)[0]
+    result = part("rockfall_addon.scene.picks.reconstruction").reconstruct_good(slope)[0]
     animation, compared = content["animations"][0], 0
     for channel in animation["channels"]:
         if channel["target"]["path"] == "translation":

@@ -72,7 +72,7 @@ def test_camera_shows_every_point_of_the_trajectories(scene, preset, part) -> No
 def test_a_given_camera_stands_in_survey_coordinates(scene, preset, part) -> None:
     from dataclasses import replace
 
-    part("rockfall_addon.scene.georeference").write_shift(
+    part("rockfall_addon.scene.terrain.georeference").write_shift(
         scene, part("core.georeference").GlobalShift(1000.0, 2000.0, 0.0)
     )
     placement = part("core.exchange.project").CameraPlacement((1060.0, 2000.0, 30.0), (1000.0, 2000.0, 30.0), 50.0)
@@ -137,8 +137,8 @@ def test_a_fall_late_in_its_video_is_in_the_first_preview(rockfall, picks: Path,
     picks.write_text("\n".join(rows) + "\n", encoding="utf-8")
     scene = bpy.context.scene
     assert bpy.ops.rockfall.import_picks(filepath=str(picks)) == {"FINISHED"}
-    scene[part("rockfall_addon.scene.store").TIME_ORIGIN] = 12.0  # a video that began 8 s before the fall
-    part("rockfall_addon.scene.sync").recompute(scene)
+    scene[part("rockfall_addon.scene.storage.store").TIME_ORIGIN] = 12.0  # a video that began 8 s before the fall
+    part("rockfall_addon.scene.footage.sync").recompute(scene)
     part("rockfall_addon.steps.film.dressing").set_up_film(scene, replace(preset, stagger_s=None), "cycles")
     assert scene.frame_current > 0
     assert not scene.objects["B block"].hide_render
@@ -162,7 +162,10 @@ def test_a_ring_for_each_impact_where_and_when_it_was(scene, part) -> None:
     marks = part("rockfall_addon.steps.film.marks").impact_marks(scene, 0.5)
     corners = np.array([vertex.co[:] for vertex in marks.data.vertices]).reshape(-1, 64, 3)
     times = np.array(
-        [each.value for each in marks.data.attributes[part("rockfall_addon.scene.materials").TIME_ATTRIBUTE].data]
+        [
+            each.value
+            for each in marks.data.attributes[part("rockfall_addon.scene.storage.materials").TIME_ATTRIBUTE].data
+        ]
     ).reshape(-1, 64)
     impacts = [o for o in scene.objects if o.get("rockfall_role") == "pick" and o["rockfall_kind"] == "impact"]
     assert len(corners) == len(impacts) > 1
@@ -335,7 +338,7 @@ def test_a_film_that_is_older_than_a_change_is_not_rendered(scene, small_film, p
     pick = next(obj for obj in scene.objects if obj.get("rockfall_kind") == "impact")
     pick.location.z += 0.5
     bpy.context.view_layer.update()
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     assert not bpy.ops.rockfall.preview_film.poll()
     assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
     bpy.data.objects.remove(scene.camera)
@@ -411,7 +414,7 @@ def test_a_scene_whose_animation_was_cleared_is_set_up_again(scene, small_film, 
     for obj in scene.objects:
         obj.animation_data_clear()
     scene.camera.data.animation_data_clear()
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
     assert sorted(state()) == sorted(before)
 

@@ -97,7 +97,7 @@ def test_without_a_flight_the_graphs_are_refused_in_words(scene, preset, part) -
         obj for obj in scene.objects if obj.get("rockfall_role") == "pick" and obj["rockfall_time_s"] not in (0.0, 50.0)
     ]:
         bpy.data.objects.remove(obj)
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     errors = part("core.errors")
     graphs = part("rockfall_addon.steps.film.graphs")
     with pytest.raises(errors.InputError, match="No trajectory has a flight"):

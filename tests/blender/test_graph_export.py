@@ -57,7 +57,7 @@ def test_graphs_of_impacts_are_written_as_they_are_set_up(scene, part, tmp_path:
     root = picture(path)
     assert (root.get("width"), root.get("height")) == ("600", "500")
     assert any("Restituted tangential speed" in text for text in words(root))
-    impacts = part("rockfall_addon.scene.comparison").comparison_of(scene).impacts
+    impacts = part("rockfall_addon.scene.models.comparison").comparison_of(scene).impacts
     known = np.isfinite(impacts.vt1) & np.isfinite(impacts.vt2)
     discs = [p.get("d") for p in root.iter(f"{SVG}path") if "a" in p.get("d") and p.get("fill") == "#000000"]
     places = sorted(tuple(map(float, re.match(r"M(\S+) ([^a]+)a(\S+)", d).groups())) for d in discs)
@@ -91,7 +91,7 @@ def test_motion_graphs_are_written_without_the_cursor(scene, part, tmp_path: Pat
     assert not any("frame" in text for text in texts)
     assert root.find(f"{SVG}rect").get("fill") != "#ffffff"
     rows = table_of(tmp_path, "MOTION")
-    impacts = part("rockfall_addon.scene.comparison").comparison_of(scene).impacts
+    impacts = part("rockfall_addon.scene.models.comparison").comparison_of(scene).impacts
     here = [row for row in rows if row["trajectory"] == "B" and row["time_s"] == "50.800000"]
     assert [float(row["kinetic_J"]) for row in here] == pytest.approx(
         [impacts.kinetic1_j[4], impacts.kinetic2_j[4]], rel=1e-6
@@ -107,7 +107,7 @@ def test_what_cannot_be_written_is_told_and_leaves_nothing(scene, part, tmp_path
         export.write(bpy.context, editor.MOTION, tmp_path / "a.pdf", (300, 200), 1.0, dark=False)
     for obj in [o for o in scene.objects if o.get("rockfall_role") == "pick"]:
         bpy.data.objects.remove(obj)
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     before = set(tmp_path.iterdir())
     for tree in (editor.MOTION, editor.IMPACTS):
         for kind in ("svg", "csv"):
@@ -139,7 +139,7 @@ def rmse(compared, rows: np.ndarray) -> float:
 
 def test_a_score_stands_above_the_graph_with_filters_and_without_fits(scene, part, tmp_path: Path) -> None:
     one_graph(scene)
-    compared = part("rockfall_addon.scene.comparison").comparison_of(scene)
+    compared = part("rockfall_addon.scene.models.comparison").comparison_of(scene)
     whole = rmse(compared, np.arange(len(compared.impacts)))
     assert f"RMSE {whole:.2f}" in exported(tmp_path / "whole.svg")
     scene.rockfall_graphs.fits = False
@@ -151,8 +151,8 @@ def test_a_score_stands_above_the_graph_with_filters_and_without_fits(scene, par
     text = exported(tmp_path / "some.svg")
     assert f"RMSE {some:.2f} filtered" in text
     assert "measured (3, 4 filtered out)" in text
-    (ranked,) = part("rockfall_addon.scene.comparison_scores").ranking(
-        scene, compared, part("rockfall_addon.scene.comparison_scores").kept_of(scene, compared)
+    (ranked,) = part("rockfall_addon.scene.models.comparison_scores").ranking(
+        scene, compared, part("rockfall_addon.scene.models.comparison_scores").kept_of(scene, compared)
     )
     assert (ranked.score.n, ranked.score.rmse) == (3, pytest.approx(some))
 
@@ -188,8 +188,8 @@ def test_a_full_disk_leaves_the_old_file(scene, tmp_path: Path, monkeypatch: pyt
 def test_all_models_have_their_score_where_there_is_little_room(scene, part, tmp_path: Path) -> None:
     one_graph(scene)
     scene.rockfall_comparison.models = names = set(part("core.impact_models.registry").COMPARED)
-    compared = part("rockfall_addon.scene.comparison").comparison_of(scene)
-    rmse_of = part("rockfall_addon.scene.comparison_scores").rmse_of
+    compared = part("rockfall_addon.scene.models.comparison").comparison_of(scene)
+    rmse_of = part("rockfall_addon.scene.models.comparison_scores").rmse_of
     wanted = {f"{rmse_of(compared, 'A', name, 'rn'):.2f}" for name in names}
     path = tmp_path / "narrow.svg"
     assert bpy.ops.rockfall.export_graphs(filepath=str(path), kind="IMPACTS", width=420, height=500) == {"FINISHED"}

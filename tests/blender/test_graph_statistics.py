@@ -17,12 +17,12 @@ def scene(rockfall) -> bpy.types.Scene:
 
 @pytest.fixture
 def statistics_of(part):
-    return part("rockfall_addon.scene.statistics").statistics_of
+    return part("rockfall_addon.scene.picks.statistics").statistics_of
 
 
 def columns(part, scene, *names: str) -> list[np.ndarray]:
     """Columns of the scene's impacts with all coefficients."""
-    impacts = part("rockfall_addon.scene.comparison").comparison_of(scene).impacts
+    impacts = part("rockfall_addon.scene.models.comparison").comparison_of(scene).impacts
     known = np.isfinite(impacts.rn) & np.isfinite(impacts.r)
     return [getattr(impacts, name)[known] for name in names]
 
@@ -69,7 +69,7 @@ def test_kept_until_a_pick_changes(scene, part, statistics_of) -> None:
     scene.rockfall_comparison.models = {"wyllie_2014"}
     assert statistics_of(scene) is before
     bpy.data.objects.remove(next(obj for obj in scene.objects if obj.get("rockfall_role") == "pick"))
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     after = statistics_of(scene)
     assert after is not before
     assert after.whole != before.whole
@@ -90,7 +90,7 @@ def test_whether_groups_differ_is_told_as_on_the_command_line(scene, part, stati
     assert len(found.tests.tests.pairs) == 3 * len(found.tests.tests.tests)
     table, out = tmp_path / "impacts.csv", tmp_path / "out"
     part("core.exchange.tables").write_impacts(
-        part("rockfall_addon.scene.comparison").comparison_of(scene).impacts, table
+        part("rockfall_addon.scene.models.comparison").comparison_of(scene).impacts, table
     )
     command = ["statistics", str(table), "--group", "theta1_deg", "--classes", "3", "--tables-only", "--out", str(out)]
     assert part("core.cli").main(command) == 0

@@ -17,13 +17,13 @@ def demo(rockfall, part) -> bpy.types.Scene:
 
 
 def _rows_selected(part, scene: bpy.types.Scene) -> set[int]:
-    pick = part("rockfall_addon.scene.comparison").comparison_of(scene).pick
+    pick = part("rockfall_addon.scene.models.comparison").comparison_of(scene).pick
     ids = {obj["rockfall_id"] for obj in bpy.context.selected_objects if "rockfall_id" in obj}
     return {row for row, identifier in enumerate(pick) if identifier in ids}
 
 
 def test_the_four_graphs_of_the_paper_without_anything_stored(rockfall, part) -> None:
-    settings, scene = part("rockfall_addon.scene.graph_settings"), bpy.context.scene
+    settings, scene = part("rockfall_addon.scene.models.graph_settings"), bpy.context.scene
     specs = [settings.spec_of(settings.graph(scene, number)) for number in settings.shown(scene)]
     assert [(spec.x, spec.y) for spec in specs] == PAPER
     assert all(spec.x_limits is spec.y_limits is None for spec in specs)
@@ -31,7 +31,7 @@ def test_the_four_graphs_of_the_paper_without_anything_stored(rockfall, part) ->
 
 
 def test_settings_are_saved_by_name(rockfall, part, tmp_path: Path) -> None:
-    settings, scene = part("rockfall_addon.scene.graph_settings"), bpy.context.scene
+    settings, scene = part("rockfall_addon.scene.models.graph_settings"), bpy.context.scene
     graph = settings.graph(scene, 1)
     graph.x, graph.y, graph.trend = "kinetic1_j", "v2_mps", "exponential"
     graph.y_log = True
@@ -57,7 +57,7 @@ def test_settings_are_saved_by_name(rockfall, part, tmp_path: Path) -> None:
 
 def test_numbers_of_choices_do_not_depend_on_their_order(rockfall, part) -> None:
     """A file keeps the number: another variable before it must not change what the graph shows."""
-    choices = part("rockfall_addon.scene.graph_settings").VARIABLE_CHOICES
+    choices = part("rockfall_addon.scene.models.graph_settings").VARIABLE_CHOICES
     numbers = {name: number for name, *_, number in choices}
     assert len(set(numbers.values())) == len(numbers)
     assert all(np.float32(number) == number for number in numbers.values()), "a button of a menu holds such a number"
@@ -65,7 +65,7 @@ def test_numbers_of_choices_do_not_depend_on_their_order(rockfall, part) -> None
 
 
 def test_a_variable_takes_its_own_axis(rockfall, part) -> None:
-    settings, scene = part("rockfall_addon.scene.graph_settings"), bpy.context.scene
+    settings, scene = part("rockfall_addon.scene.models.graph_settings"), bpy.context.scene
     settings.set_limits(scene, 0, (5.0, 20.0), (1.0, 2.0))
     graph = settings.graph(scene, 0)
     graph.x_log = True
@@ -83,7 +83,7 @@ def test_a_variable_takes_its_own_axis(rockfall, part) -> None:
 
 
 def test_one_graph_alone(rockfall, part) -> None:
-    settings, scene = part("rockfall_addon.scene.graph_settings"), bpy.context.scene
+    settings, scene = part("rockfall_addon.scene.models.graph_settings"), bpy.context.scene
     scene.rockfall_graphs.maximised = 3
     assert settings.shown(scene) == (2,)
     scene.rockfall_graphs.count = 2
@@ -91,8 +91,8 @@ def test_one_graph_alone(rockfall, part) -> None:
 
 
 def test_scene_and_graphs_share_one_selection(demo, part) -> None:
-    selection, picks = part("rockfall_addon.view.graphs.selection"), part("rockfall_addon.scene.picks")
-    compared = part("rockfall_addon.scene.comparison").comparison_of(demo)
+    selection, picks = part("rockfall_addon.view.graphs.selection"), part("rockfall_addon.scene.picks.picks")
+    compared = part("rockfall_addon.scene.models.comparison").comparison_of(demo)
     assert len(set(compared.pick)) == len(compared.impacts) == 104
     chosen = frozenset({(0, 3), (0, 50)})
     selection.select(bpy.context, chosen, (0, 50))
@@ -111,8 +111,8 @@ def test_scene_and_graphs_share_one_selection(demo, part) -> None:
 
 
 def test_selecting_leaves_what_is_no_pick_or_hidden(demo, part) -> None:
-    selection, picks = part("rockfall_addon.view.graphs.selection"), part("rockfall_addon.scene.picks")
-    compared = part("rockfall_addon.scene.comparison").comparison_of(demo)
+    selection, picks = part("rockfall_addon.view.graphs.selection"), part("rockfall_addon.scene.picks.picks")
+    compared = part("rockfall_addon.scene.models.comparison").comparison_of(demo)
     hidden = picks.with_id(demo, compared.pick[7])
     hidden.hide_set(True)
     block = next(obj for obj in demo.objects if obj.get("rockfall_role") == "block")
@@ -144,7 +144,7 @@ def test_the_header_of_other_node_editors_stays_blenders(clean_blender, installa
 
 def test_columns_colour_and_filter(demo, part) -> None:
     assert bpy.ops.rockfall.colour_graphs(column="trajectory") == {"FINISHED"}
-    sheet, comparison = part("rockfall_addon.view.graphs.impact_sheet"), part("rockfall_addon.scene.comparison")
+    sheet, comparison = part("rockfall_addon.view.graphs.impact_sheet"), part("rockfall_addon.scene.models.comparison")
     compared = comparison.comparison_of(demo)
     assert sheet.rows_of(demo, compared)[0].all()
     assert bpy.ops.rockfall.add_graph_filter(column="trajectory") == {"FINISHED"}

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def test_what_the_filter_leaves_out_is_shown_on_request_and_is_no_terrain(part, tmp_path):
-    store, terrain = part("rockfall_addon.scene.store"), part("rockfall_addon.scene.terrain")
+    store, terrain = part("rockfall_addon.scene.storage.store"), part("rockfall_addon.scene.terrain.terrain")
     rng = np.random.default_rng(1)
     ground = np.column_stack([rng.random((2_000, 2)) * 20, np.zeros(2_000)])
     plants = np.column_stack([5 + rng.random((300, 2)) * 4, rng.uniform(2, 6, 300)])
@@ -29,7 +29,7 @@ def test_trees_that_were_read_as_ground_are_noticed_until_they_are_filtered_out(
     ground = np.column_stack([rng.random((2_000, 2)) * 20, np.zeros(2_000)])
     plants = np.column_stack([5 + rng.random((600, 2)) * 8, rng.uniform(2, 6, 600)])
     np.savetxt(tmp_path / "cloud.xyz", np.vstack([ground, plants]), fmt="%.3f")
-    terrain, following = part("rockfall_addon.scene.terrain"), part("rockfall_addon.scene.next_step")
+    terrain, following = part("rockfall_addon.scene.terrain.terrain"), part("rockfall_addon.scene.next_step")
     panel, scene = bpy.types.ROCKFALL_PT_terrain, bpy.context.scene
     bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "cloud.xyz"))
     (tile,) = terrain.tiles(scene)

@@ -10,7 +10,7 @@ from two_runs import picks_of
 
 
 def test_the_table_selects_and_follows_the_selection(scene: bpy.types.Scene, part) -> None:
-    rows = part("rockfall_addon.scene.impact_rows")
+    rows = part("rockfall_addon.scene.picks.impact_rows")
     assert [(row.trajectory, row.number) for row in scene.rockfall_impacts] == [
         (name, i) for name in "AB" for i in (1, 2, 3)
     ]
@@ -59,7 +59,7 @@ def test_a_heading_says_what_its_numbers_are(scene: bpy.types.Scene, part) -> No
 
 
 def test_the_panel_shows_what_is_stored_of_a_pick(scene: bpy.types.Scene, part) -> None:
-    store = part("rockfall_addon.scene.store")
+    store = part("rockfall_addon.scene.storage.store")
     pick = picks_of(scene, "A")[1]
     for status in ("ok", "doubtful", "shattered", "discarded"):
         pick[store.STATUS] = status

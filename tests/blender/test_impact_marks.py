@@ -17,7 +17,7 @@ def frames_of(scene: bpy.types.Scene) -> dict[str, float]:
 
 def test_marks_are_where_the_keys_are_and_follow_edits(rockfall, part) -> None:
     assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
-    scene, impact_marks = bpy.context.scene, part("rockfall_addon.scene.impact_marks")
+    scene, impact_marks = bpy.context.scene, part("rockfall_addon.scene.picks.impact_marks")
 
     def check() -> object:
         marks, keys = impact_marks.marks(scene), frames_of(scene)
@@ -28,8 +28,8 @@ def test_marks_are_where_the_keys_are_and_follow_edits(rockfall, part) -> None:
 
     before = check()
     assert impact_marks.marks(scene) is before, "kept"
-    pick = part("rockfall_addon.scene.picks").with_id(scene, before.identifier[4])
-    part("rockfall_addon.scene.sync").nudge(scene, pick, 0.3)
+    pick = part("rockfall_addon.scene.picks.picks").with_id(scene, before.identifier[4])
+    part("rockfall_addon.scene.footage.sync").nudge(scene, pick, 0.3)
     after = check()
     assert np.abs(after.frame - before.frame).sum() == pytest.approx(0.3, abs=1e-3), "one has moved"
     pick.rockfall_pick.status = "doubtful"

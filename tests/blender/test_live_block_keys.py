@@ -27,7 +27,7 @@ def check_block(scene: bpy.types.Scene, part, name: str) -> None:
     frames = [(pick["rockfall_time_s"] - 10.0 - 30.0 * (name == "B")) * rate for pick in picks_of(scene, name)]
     frames = [frame + (name == "B") * scene.rockfall.stagger_s * rate for frame in frames]
     assert key_frames(block) == [[pytest.approx(frame, abs=1e-4) for frame in frames]] * 3
-    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
+    result = part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(scene)
     states = part("core.reconstruction.flight").flight_states
     for i in np.flatnonzero(result.flights.trajectory == name):
         start, end = result.flights.start_time_s[i], result.flights.end_time_s[i]
@@ -228,7 +228,7 @@ def test_a_key_of_the_block_counts_once_while_its_run_cannot_be_computed(scene: 
         curve.update()
     update()
     for _ in range(3):
-        part("rockfall_addon.scene.sync").sync(scene)
+        part("rockfall_addon.scene.footage.sync").sync(scene)
     assert third["rockfall_time_s"] == pytest.approx(time + 3.0 / RATE, abs=1e-6)
     first.rockfall_pick.time_s = "10.9"
     assert scene["rockfall_problem"] == ""
@@ -242,12 +242,12 @@ def test_while_a_key_of_the_block_is_held_the_flights_follow_and_nothing_is_writ
     for curve in curves_of(block):
         nearest(curve, frame).co_ui[0] += 6.0
     before = places(trail(scene, "A").data)
-    assert part("rockfall_addon.scene.sync").sync(scene, dragging=True).rebuilt == ["A"]
+    assert part("rockfall_addon.scene.footage.sync").sync(scene, dragging=True).rebuilt == ["A"]
     assert pick["rockfall_time_s"] == time
     held = places(trail(scene, "A").data)
     assert held.shape != before.shape or not np.allclose(held, before, atol=1e-3)
     assert nearest(curves_of(block)[0], frame + 6.0).co[0] == pytest.approx(frame + 6.0)
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     assert pick["rockfall_time_s"] == pytest.approx(time + 6 / RATE, abs=1e-6)
     np.testing.assert_allclose(places(trail(scene, "A").data), held, atol=1e-4)
     check_block(scene, part, "A")

@@ -95,7 +95,7 @@ def test_colours(scene: bpy.types.Scene, part, by: str) -> None:
 
 def test_flights_join_centres(slope: bpy.types.Scene, part) -> None:
     slope.rockfall.flights_join = "centres"
-    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(slope)
+    result = part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(slope)
     assert result.ends == "centres"
     pick = picks_of(slope, "A")[1]
     frame = pick["rockfall_key_frame"]
@@ -132,16 +132,19 @@ def test_nothing_but_what_passes_below_the_terrain_is_red(part, monkeypatch) -> 
     assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
     assert bpy.ops.rockfall.propose_impacts() == {"FINISHED"}
     scene, view = bpy.context.scene, part("rockfall_addon.view.footage_view")
-    picks, camera = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.videos").cameras(scene)[0]
+    picks, camera = (
+        part("rockfall_addon.scene.picks.picks"),
+        part("rockfall_addon.scene.footage.videos").cameras(scene)[0],
+    )
     click = SimpleNamespace(ellipse=np.eye(3)[:2])
-    monkeypatch.setattr(part("rockfall_addon.scene.clicks"), "of", lambda _: {"video": click})
-    monkeypatch.setattr(part("rockfall_addon.scene.clicks"), "epipolar", lambda *_: None)
+    monkeypatch.setattr(part("rockfall_addon.scene.footage.clicks"), "of", lambda _: {"video": click})
+    monkeypatch.setattr(part("rockfall_addon.scene.footage.clicks"), "epipolar", lambda *_: None)
     chosen, found = picks.objects_of(scene)[0], part("rockfall_addon.view.drawn").Drawing()
-    view._add_active(found, scene, camera, part("rockfall_addon.scene.pictures").posed(camera, 2.0), chosen)
+    view._add_active(found, scene, camera, part("rockfall_addon.scene.footage.pictures").posed(camera, 2.0), chosen)
     colours = [tuple(line.colour.reshape(-1, 4)[0]) for line in found.lines]
     solid = part("rockfall_addon.steps.picking.overlay")._solid(scene, chosen)
     assert (len(colours), len(solid)) >= (2, 1), "the ellipse of the click is drawn in both views"
-    marking, pairs = part("rockfall_addon.steps.alignment.overlay"), part("rockfall_addon.scene.pairs")
+    marking, pairs = part("rockfall_addon.steps.alignment.overlay"), part("rockfall_addon.scene.footage.pairs")
     colours += [colour for _, colour in solid]
     colours += [marking.WRONG, *map(marking.palette, range(pairs.COLOURS)), *picks.MARKER_COLOURS.values()]
     colours += [model.colour for model in part("core.impact_models.registry").MODELS.values()]

@@ -42,7 +42,9 @@ def test_a_moved_pick_stays_on_the_terrain(slope: bpy.types.Scene, part) -> None
 def test_a_second_pick_that_is_still_held_makes_a_flight_of_which_nothing_is_put_back(
     slope: bpy.types.Scene, part
 ) -> None:
-    picks, sync, following = (part(f"rockfall_addon.scene.{name}") for name in ("picks", "sync", "next_step"))
+    picks, sync, following = (
+        part(f"rockfall_addon.scene.{name}") for name in ("picks.picks", "footage.sync", "next_step")
+    )
     for obj in [one for name in "AB" for one in picks_of(slope, name)]:
         bpy.data.objects.remove(obj)
     picks.add_pick(slope, "C", 20.0, [0.0, 0.0, ground(0.0)])
@@ -59,10 +61,12 @@ def test_a_second_pick_that_is_still_held_makes_a_flight_of_which_nothing_is_put
 def test_what_comes_while_a_person_drags_belongs_to_an_undo_step_afterwards_and_once(
     slope: bpy.types.Scene, part, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sync, picks = part("rockfall_addon.scene.sync"), part("rockfall_addon.scene.picks")
+    sync, picks = part("rockfall_addon.scene.footage.sync"), part("rockfall_addon.scene.picks.picks")
     held, stored = [True], []
     monkeypatch.setattr(sync, "is_dragging", lambda: bool(held))
-    monkeypatch.setattr(part("rockfall_addon.scene.undo"), "extend_last_step", lambda name: stored.append(bool(held)))
+    monkeypatch.setattr(
+        part("rockfall_addon.scene.storage.undo"), "extend_last_step", lambda name: stored.append(bool(held))
+    )
     for time, x in ((20.0, 0.0), (21.0, 6.0)):
         picks.add_pick(slope, "C", time, [x, 0.0, ground(x)])
     sync.touch(slope, ["C"])
@@ -95,7 +99,7 @@ def test_a_key_that_is_moved_and_put_back_gives_the_time_back(scene: bpy.types.S
     update()
     pick = picks_of(scene, "A")[3]
     pick["rockfall_time_s"] = time = 10.0 + 515.123456789 / 240
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     (before,) = key_frames(pick)[0]
     for wanted in (before + frames, before):
         for curve in pick.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
@@ -229,7 +233,7 @@ def test_the_panel_shows_the_stored_kind_and_status(scene: bpy.types.Scene) -> N
 
 
 def test_a_new_pick(slope: bpy.types.Scene, part) -> None:
-    picks, live = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.sync")
+    picks, live = part("rockfall_addon.scene.picks.picks"), part("rockfall_addon.scene.footage.sync")
     for time, x in ((50.0, 2.0), (50.8, 6.0), (51.5, 11.0)):
         picks.add_pick(slope, "new run", time, [x, -3.0, ground(x)])
     live.sync(slope)

@@ -86,7 +86,10 @@ def edit_in_edit_mode(tile: bpy.types.Object) -> None:
 @pytest.mark.parametrize("edit", [edit_by_script, edit_in_edit_mode])
 def test_an_edited_terrain_is_seen(slope: bpy.types.Scene, part, edit, numbers) -> None:
     """Vertices that move, as many as before: rays, normals, results and fingerprints are of the new surface."""
-    terrain, reconstruction = part("rockfall_addon.scene.terrain"), part("rockfall_addon.scene.reconstruction")
+    terrain, reconstruction = (
+        part("rockfall_addon.scene.terrain.terrain"),
+        part("rockfall_addon.scene.picks.reconstruction"),
+    )
     (tile,) = terrain.tiles(slope)
     cast = part("core.terrain.raycast").cast_rays
     above, down = np.array([[10.0, 0.0, 500.0]]), np.array([[0.0, 0.0, -1.0]])
@@ -107,20 +110,20 @@ def test_an_edited_terrain_is_seen(slope: bpy.types.Scene, part, edit, numbers) 
     shown = slope["rockfall_shown"]
     tile.data.update()
     update()
-    assert part("rockfall_addon.scene.sync").sync(slope).rebuilt == []
+    assert part("rockfall_addon.scene.footage.sync").sync(slope).rebuilt == []
     assert slope["rockfall_shown"] == shown
 
 
 def test_unit_scale_backside_and_early_picks_are_told(slope: bpy.types.Scene, part) -> None:
     slope.unit_settings.scale_length = 0.01
-    part("rockfall_addon.scene.sync").touch(slope)
+    part("rockfall_addon.scene.footage.sync").touch(slope)
     assert "unit scale is 0.01" in slope["rockfall_problem"]
     slope.unit_settings.scale_length = 1.0
-    part("rockfall_addon.scene.sync").touch(slope)
+    part("rockfall_addon.scene.footage.sync").touch(slope)
     assert slope["rockfall_problem"] == ""
     pick = picks_of(slope, "A")[1]
     pick["rockfall_normal"] = [0.0, 0.6, -0.8]
-    part("rockfall_addon.scene.sync").touch(slope)
+    part("rockfall_addon.scene.footage.sync").touch(slope)
     assert "Trajectory A, 10.731 s: the pick is on the back" in slope["rockfall_problem"]
     del pick["rockfall_normal"]
     slope["rockfall_time_origin_s"] = 10.5
@@ -131,7 +134,7 @@ def test_unit_scale_backside_and_early_picks_are_told(slope: bpy.types.Scene, pa
 
 
 def test_errors_of_ours_are_told_once(scene: bpy.types.Scene, part, monkeypatch, capsys) -> None:
-    live, problems = part("rockfall_addon.scene.sync"), part("rockfall_addon.scene.problems")
+    live, problems = part("rockfall_addon.scene.footage.sync"), part("rockfall_addon.scene.problems")
 
     def broken(*_: object, **__: object) -> None:
         raise ValueError("quite unexpected")

@@ -34,7 +34,7 @@ def picks_of(scene: bpy.types.Scene, name: str) -> list[bpy.types.Object]:
 
 
 def test_times_are_those_at_which_the_scene_plays_the_impacts(scene, part) -> None:
-    courses = part("rockfall_addon.scene.motion").motion_of(scene).courses
+    courses = part("rockfall_addon.scene.models.motion").motion_of(scene).courses
     assert [course.trajectory for course in courses] == ["A", "B", "C"]
     for course in courses:
         frames = [obj["rockfall_key_frame"] / 25 for obj in picks_of(scene, course.trajectory)]
@@ -43,11 +43,13 @@ def test_times_are_those_at_which_the_scene_plays_the_impacts(scene, part) -> No
     speed = part("core.analysis.motion_graphs").SPEED
     assert courses[1].at(speed, DELAY_S) == pytest.approx(np.hypot(5.0, -3.0 + 9.81 / 2))
     scene.rockfall.playback = "REAL"
-    assert part("rockfall_addon.scene.motion").motion_of(scene).courses[1].impact_time_s[0] == pytest.approx(100.0)
+    assert part("rockfall_addon.scene.models.motion").motion_of(scene).courses[1].impact_time_s[0] == pytest.approx(
+        100.0
+    )
 
 
 def test_only_what_has_changed_is_computed_again(scene, part, monkeypatch) -> None:
-    motion, sync = part("rockfall_addon.scene.motion"), part("rockfall_addon.scene.sync")
+    motion, sync = part("rockfall_addon.scene.models.motion"), part("rockfall_addon.scene.footage.sync")
     before = motion.motion_of(scene)
     assert motion.motion_of(scene) is before
     picks_of(scene, "B")[1]["rockfall_time_s"] += 0.1
@@ -66,7 +68,7 @@ def test_only_what_has_changed_is_computed_again(scene, part, monkeypatch) -> No
 
 
 def test_a_pick_is_followed_while_it_is_dragged(scene, part) -> None:
-    motion, sync = part("rockfall_addon.scene.motion"), part("rockfall_addon.scene.sync")
+    motion, sync = part("rockfall_addon.scene.models.motion"), part("rockfall_addon.scene.footage.sync")
     before = motion.motion_of(scene).courses
     picks_of(scene, "C")[2].location.x += 1.0
     bpy.context.view_layer.update()
@@ -78,7 +80,7 @@ def test_a_pick_is_followed_while_it_is_dragged(scene, part) -> None:
 
 
 def test_a_bad_trajectory_is_told_and_the_others_are_shown(scene, part) -> None:
-    motion, sync = part("rockfall_addon.scene.motion"), part("rockfall_addon.scene.sync")
+    motion, sync = part("rockfall_addon.scene.models.motion"), part("rockfall_addon.scene.footage.sync")
     first, second, *_ = picks_of(scene, "A")
     second["rockfall_time_s"] = first["rockfall_time_s"]
     sync.sync(scene, ["A"])
@@ -89,7 +91,10 @@ def test_a_bad_trajectory_is_told_and_the_others_are_shown(scene, part) -> None:
 
 
 def test_limits_are_kept_with_the_scene_and_reset(scene, part) -> None:
-    sheet, settings = part("rockfall_addon.view.graphs.motion_sheet"), part("rockfall_addon.scene.motion_settings")
+    sheet, settings = (
+        part("rockfall_addon.view.graphs.motion_sheet"),
+        part("rockfall_addon.scene.models.motion_settings"),
+    )
     graphs = part("core.analysis.motion_graphs")
     kept = sheet._kept(scene)
     kept.shown = sheet._Shown(quantities=(graphs.SPEED, graphs.KINETIC))
@@ -135,11 +140,13 @@ def test_a_dragged_pick_lies_on_the_terrain_as_its_flights_do(part, tmp_path: Pa
         "level",
     )
     scene = bpy.context.scene
-    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    part("rockfall_addon.scene.terrain.terrain").add_terrain(
+        scene, surface, part("core.terrain.shading").shade(surface)
+    )
     path = tmp_path / "picks.csv"
     path.write_text(HEADER + "".join(f"A,{t!r},{5.0 * t!r},0.0,0.0\n" for t in TIMES), encoding="utf-8")
     assert bpy.ops.rockfall.import_picks(filepath=str(path)) == {"FINISHED"}
-    motion, sync = part("rockfall_addon.scene.motion"), part("rockfall_addon.scene.sync")
+    motion, sync = part("rockfall_addon.scene.models.motion"), part("rockfall_addon.scene.footage.sync")
     height = part("core.analysis.motion_graphs").HEIGHT
     (course,) = motion.motion_of(scene).courses
     assert course.at(height, 1.5) == pytest.approx(9.81 / 8, abs=1e-3)

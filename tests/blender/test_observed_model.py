@@ -16,8 +16,8 @@ def test_measured_rebounds_are_shown_beside_the_real_blocks(demo: bpy.types.Scen
     assert bpy.ops.rockfall.show_models(models={"observed", "noel_2017"}) == {"FINISHED"}
     blocks = [obj for obj in demo.objects if obj.get("rockfall_role") == "twin" and obj["rockfall_model"] == "observed"]
     assert {obj["rockfall_trajectory"] for obj in blocks} == {f"B{i:02}" for i in range(1, 16)}
-    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(demo)
-    shown = part("rockfall_addon.scene.models").find_predictions(demo, result, ("observed",))
+    result = part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(demo)
+    shown = part("rockfall_addon.scene.models.models").find_predictions(demo, result, ("observed",))
     compared = part("core.analysis.comparison").compare(result.impacts, ["observed"])
     assert compared.measured is not None
     assert len(compared.measured) == 83

@@ -95,7 +95,7 @@ def test_a_standard_deviation_has_a_digit_that_is_not_zero_where_two_more_suffic
 def test_coefficients_have_intervals_in_words(part, scene, draw, numbers) -> None:
     pick = scene.objects["B impact 2"]
     new = {"rn": 0.87, "interval_rn": (0.803, 0.964), "rt": 0.7, "interval_rt": (0.05, 3.0)}
-    part("rockfall_addon.scene.impact_numbers").keep(pick, numbers(pick) | new)
+    part("rockfall_addon.scene.picks.impact_numbers").keep(pick, numbers(pick) | new)
     assert "R_N 0.87 (0.80 to 0.96)   R_T undetermined" in part("rockfall_addon.view.impact_words").numbers(pick)
     select(pick)
     written = [text for _, text in draw("ROCKFALL_PT_impact")]
@@ -139,7 +139,7 @@ def test_the_first_advice_is_the_terrain(draw) -> None:
 
 
 def test_with_a_video_alone_no_demo_is_offered(part) -> None:
-    part("rockfall_addon.scene.new_videos").add_video(bpy.context.scene, FOOTAGE)
+    part("rockfall_addon.scene.footage.new_videos").add_video(bpy.context.scene, FOOTAGE)
     step = part("rockfall_addon.scene.next_step").next_step(bpy.context.scene)
     assert step.actions == ("rockfall.import_terrain", "rockfall.open_project")
 
@@ -148,8 +148,8 @@ def test_a_second_video_is_to_be_aligned_before_picking(part) -> None:
     scene, following = bpy.context.scene, part("rockfall_addon.scene.next_step")
     bpy.ops.rockfall.load_footage_demo()
     assert "rockfall.propose_impacts" in following.next_step(scene).actions
-    first = part("rockfall_addon.scene.videos").active_camera(scene)
-    second = part("rockfall_addon.scene.new_videos").add_video(scene, FOOTAGE)
+    first = part("rockfall_addon.scene.footage.videos").active_camera(scene)
+    second = part("rockfall_addon.scene.footage.new_videos").add_video(scene, FOOTAGE)
     bpy.ops.rockfall.look_through(identifier=first["rockfall_id"])
     step = following.next_step(scene)
     assert (step.actions[0], step.video) == ("rockfall.look_through", second["rockfall_id"])
@@ -160,7 +160,7 @@ def test_a_track_after_the_last_pick_is_said_until_it_stopped_there(part) -> Non
     scene, following = bpy.context.scene, part("rockfall_addon.scene.next_step")
     bpy.ops.rockfall.load_footage_demo()
     bpy.ops.rockfall.propose_impacts()
-    store = part("rockfall_addon.scene.store")
+    store = part("rockfall_addon.scene.storage.store")
     picks = sorted(store.with_role(scene, store.PICK_ROLE), key=lambda pick: pick[store.TIME])
     assert "is tracked until" in following.next_step(scene).sentence, "it moves on by 1.5 m after its last impact"
     picks[-1][store.KIND] = "stop"
@@ -194,11 +194,11 @@ def test_text_fills_the_width_of_a_panel_and_is_nowhere_cut_off(part, words, sca
 def test_two_videos_that_are_aligned_are_to_be_synchronised_now(part) -> None:
     assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
     scene, wording = bpy.context.scene, part("rockfall_addon.steps.videos.wording")
-    first = part("rockfall_addon.scene.videos").cameras(scene)[0]
+    first = part("rockfall_addon.scene.footage.videos").cameras(scene)[0]
     assert bpy.ops.rockfall.add_video(filepath=str(FOOTAGE)) == {"FINISHED"}
-    second = part("rockfall_addon.scene.videos").active_camera(scene)
+    second = part("rockfall_addon.scene.footage.videos").active_camera(scene)
     assert "Once both are aligned, do so." in wording.warnings(scene, second)[0].text
-    paths = part("rockfall_addon.scene.camera_paths")
+    paths = part("rockfall_addon.scene.footage.camera_paths")
     paths.set_camera_path(scene, second, paths.camera_path(first))
     assert "Mark one event in both, and synchronise them." in wording.warnings(scene, second)[0].text
 
@@ -209,7 +209,7 @@ def test_the_card_of_a_lone_impact_has_no_question_marks(scene, part, numbers) -
     assert {line[0] for line in words.numbers(pick)} >= {"v", "E"}
     unknown = ("incident_mps", "restituted_mps", "kinetic1_j", "kinetic2_j", "rn", "rt")
     rest = {name: value for name, value in numbers(pick).items() if name not in unknown}
-    part("rockfall_addon.scene.impact_numbers").keep(pick, rest)
+    part("rockfall_addon.scene.picks.impact_numbers").keep(pick, rest)
     assert words.numbers(pick) == []
 
 

@@ -32,7 +32,7 @@ def test_the_name_of_an_impact_has_its_number_in_the_tables(scene, part, tmp_pat
 
 def test_names_follow_insertion_and_deletion_and_time(scene, part) -> None:
     assert names(scene) == RUN
-    early = part("rockfall_addon.scene.picks").add_pick(scene, "A", 10.3, (2.0, 0.0, ground(2.0)))
+    early = part("rockfall_addon.scene.picks.picks").add_pick(scene, "A", 10.3, (2.0, 0.0, ground(2.0)))
     update()
     assert names(scene) == [*RUN[:2], "A impact 2", "A impact 3", "A impact 4", "A stop 1"]
     assert early.name == "A impact 1"
@@ -46,7 +46,7 @@ def test_names_follow_insertion_and_deletion_and_time(scene, part) -> None:
 
 def test_names_go_back_and_forth_with_undo(scene, part) -> None:
     bpy.ops.ed.undo_push(message="before")
-    part("rockfall_addon.scene.picks").add_pick(scene, "A", 10.3, (2.0, 0.0, ground(2.0)))
+    part("rockfall_addon.scene.picks.picks").add_pick(scene, "A", 10.3, (2.0, 0.0, ground(2.0)))
     bpy.ops.ed.undo_push(message="a pick")  # stored before its trajectory follows
     update()
     bpy.data.objects.remove(picks_of(scene, "A")[3])
@@ -78,7 +78,7 @@ def test_names_that_a_person_gave_stay(scene, part) -> None:
 
 
 def test_a_name_longer_than_blenders_is_cut_once(part) -> None:
-    follow = part("rockfall_addon.scene.pick_names").follow
+    follow = part("rockfall_addon.scene.picks.pick_names").follow
     picks = [bpy.data.objects.new("x 01 impact", None) for _ in range(2)]
     for number, pick in enumerate(picks):
         pick["rockfall_trajectory"], pick["rockfall_kind"], pick["rockfall_time_s"] = "ä" * 300, "impact", number
@@ -92,7 +92,7 @@ def test_two_scenes_do_not_take_names_from_one_another(scene, part) -> None:
     for obj in picks_of(scene, "A"):
         twin = obj.copy()
         other.collection.objects.link(twin)
-    follow = part("rockfall_addon.scene.pick_names").follow
+    follow = part("rockfall_addon.scene.picks.pick_names").follow
     twins = [obj for obj in other.collection.objects if obj.get("rockfall_role") == "pick"]
     assert not follow(twins)
     assert not follow(picks_of(scene, "A"))

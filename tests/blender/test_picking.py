@@ -36,13 +36,15 @@ def impacts() -> list[dict[str, str]]:
 def site(part) -> bpy.types.Scene:
     """The demo's terrain and footage, the camera as it truly was."""
     scene = bpy.context.scene
-    new_videos = part("rockfall_addon.scene.new_videos")
-    clocks = part("rockfall_addon.scene.clocks")
-    camera_paths = part("rockfall_addon.scene.camera_paths")
+    new_videos = part("rockfall_addon.scene.footage.new_videos")
+    clocks = part("rockfall_addon.scene.footage.clocks")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
     surface = part("core.terrain.readers").read_terrain(
         DEMO / "terrain.ply", shift=part("core.georeference").GlobalShift(*ORIGIN)
     )
-    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    part("rockfall_addon.scene.terrain.terrain").add_terrain(
+        scene, surface, part("core.terrain.shading").shade(surface)
+    )
     camera = new_videos.add_video(scene, FOOTAGE / "footage.mp4")
     poses = rows("camera.csv")
     model = part("core.camera.model")
@@ -63,7 +65,7 @@ def site(part) -> bpy.types.Scene:
 
 
 def camera_of(scene: bpy.types.Scene, part) -> bpy.types.Object:
-    (camera,) = part("rockfall_addon.scene.videos").cameras(scene)
+    (camera,) = part("rockfall_addon.scene.footage.videos").cameras(scene)
     return camera
 
 
@@ -80,7 +82,7 @@ def exact(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
 
 
 def pick(scene: bpy.types.Scene, part, frame: int, pixel: np.ndarray, name: str = "B10", **how) -> bpy.types.Object:
-    places, editing = part("rockfall_addon.scene.places"), part("rockfall_addon.steps.picking.editing")
+    places, editing = part("rockfall_addon.scene.picks.places"), part("rockfall_addon.steps.picking.editing")
     scene.frame_set(frame)
     camera = camera_of(scene, part)
     place = places.in_picture(scene, camera, pixel, name, **how)
@@ -91,7 +93,7 @@ def pick(scene: bpy.types.Scene, part, frame: int, pixel: np.ndarray, name: str 
 
 def test_a_pixel_of_the_ground_is_the_point_of_the_ground(site, part, impacts) -> None:
     """A true contact point, projected by hand, is found again."""
-    places = part("rockfall_addon.scene.places")
+    places = part("rockfall_addon.scene.picks.places")
     camera, poses = camera_of(site, part), rows("camera.csv")
     exact(site, camera)
     for row in impacts[:5]:
@@ -119,9 +121,9 @@ def test_a_pixel_of_the_ground_is_the_point_of_the_ground(site, part, impacts) -
 
 def test_the_middle_of_the_block_is_a_radius_from_the_ground(site, part, impacts) -> None:
     """The block's centre at the impact, as pixel → the contact that the truth has."""
-    places, pictures = part("rockfall_addon.scene.places"), part("rockfall_addon.scene.pictures")
+    places, pictures = part("rockfall_addon.scene.picks.places"), part("rockfall_addon.scene.footage.pictures")
     camera, paths = camera_of(site, part), part("core.camera.path")
-    path = part("rockfall_addon.scene.camera_paths").camera_path(camera)
+    path = part("rockfall_addon.scene.footage.camera_paths").camera_path(camera)
     assert isinstance(path, paths.CameraPath)
     for row in impacts[:5]:
         frame = round(float(row["time_s"]) * 30)
@@ -147,7 +149,7 @@ def test_clicks_become_picks_and_trajectories(site, part, impacts) -> None:
     flights = [obj for obj in site.objects if obj.get("rockfall_role") == "flights"]
     assert len(flights) == 1, "the trajectory follows by itself"
     assert len(site.rockfall_impacts) == 3
-    table = part("rockfall_addon.scene.picks").picks_of(site)
+    table = part("rockfall_addon.scene.picks.picks").picks_of(site)
     assert set(table.extra["video"].tolist()) == {"footage"}
     assert float(table.extra["u_px"][0]) == float(block[frames[0]]["u_px"])
 
@@ -164,7 +166,7 @@ def test_a_second_click_in_one_picture_moves_the_pick(site, part) -> None:
 
 
 def test_what_was_seen_is_forgotten_when_the_pick_is_moved(site, part) -> None:
-    clicks = part("rockfall_addon.scene.clicks")
+    clicks = part("rockfall_addon.scene.footage.clicks")
     obj = pick(site, part, 60, np.array([700.0, 300.0]))
     (seen,) = clicks.of(obj).values()
     assert (seen.frame, seen.pixel.tolist(), seen.centre) == (60, [700.0, 300.0], True)
@@ -175,7 +177,7 @@ def test_what_was_seen_is_forgotten_when_the_pick_is_moved(site, part) -> None:
 
 
 def test_a_cancelled_click_leaves_the_pick_as_it_was(site, part) -> None:
-    places, editing = part("rockfall_addon.scene.places"), part("rockfall_addon.steps.picking.editing")
+    places, editing = part("rockfall_addon.scene.picks.places"), part("rockfall_addon.steps.picking.editing")
     obj = pick(site, part, 60, np.array([700.0, 300.0]))
     kept = editing.snapshot(obj)
     camera = camera_of(site, part)
@@ -194,10 +196,12 @@ def test_grazing_rays_are_warned_of(part) -> None:
         np.array([[-200.0, -200, 0], [200, -200, 0], [200, 200, 0], [-200, 200, 0]]),
         np.array([[0, 1, 2], [0, 2, 3]]), part("core.georeference").GlobalShift(), "plane", (),
     )  # fmt: skip
-    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
-    new_videos = part("rockfall_addon.scene.new_videos")
-    camera_paths = part("rockfall_addon.scene.camera_paths")
-    places = part("rockfall_addon.scene.places")
+    part("rockfall_addon.scene.terrain.terrain").add_terrain(
+        scene, surface, part("core.terrain.shading").shade(surface)
+    )
+    new_videos = part("rockfall_addon.scene.footage.new_videos")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
+    places = part("rockfall_addon.scene.picks.places")
     editing = part("rockfall_addon.steps.picking.editing")
     camera = new_videos.add_video(scene, FOOTAGE / "footage.mp4")
     lens = part("core.camera.model").look_at(1280, 720, (0, -60, 2), (0, 0, 0), focal_px=1000)
@@ -215,11 +219,11 @@ def test_grazing_rays_are_warned_of(part) -> None:
 
 
 def test_without_an_aligned_camera_the_terrain_is_picked(site, part) -> None:
-    errors, places = part("core.errors"), part("rockfall_addon.scene.places")
+    errors, places = part("core.errors"), part("rockfall_addon.scene.picks.places")
     editing = part("rockfall_addon.steps.picking.editing")
     camera = camera_of(site, part)
     site.frame_set(90)
-    part("rockfall_addon.scene.camera_paths").unsolve(camera)
+    part("rockfall_addon.scene.footage.camera_paths").unsolve(camera)
     with pytest.raises(errors.RockfallError, match="not aligned"):
         places.in_picture(site, camera, np.array([640.0, 360.0]), "B10")
     place = places.on_ray(site, np.array([8.0, 60.0, 200.0]), np.array([0.0, 0.0, -1.0]), "B10")
@@ -231,7 +235,7 @@ def test_without_an_aligned_camera_the_terrain_is_picked(site, part) -> None:
 
 
 def test_without_a_video_the_scene_is_the_clock(site, part) -> None:
-    places, editing = part("rockfall_addon.scene.places"), part("rockfall_addon.steps.picking.editing")
+    places, editing = part("rockfall_addon.scene.picks.places"), part("rockfall_addon.steps.picking.editing")
     bpy.data.objects.remove(camera_of(site, part))
     del site["rockfall_time_origin_s"]
     for frame, y in ((30, 60.0), (60, 55.0)):
@@ -245,11 +249,11 @@ def test_without_a_video_the_scene_is_the_clock(site, part) -> None:
 
 
 def test_two_views_make_one_point(site, part) -> None:
-    new_videos = part("rockfall_addon.scene.new_videos")
-    clocks = part("rockfall_addon.scene.clocks")
-    camera_paths = part("rockfall_addon.scene.camera_paths")
-    places = part("rockfall_addon.scene.places")
-    pictures, clicks = part("rockfall_addon.scene.pictures"), part("rockfall_addon.scene.clicks")
+    new_videos = part("rockfall_addon.scene.footage.new_videos")
+    clocks = part("rockfall_addon.scene.footage.clocks")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
+    places = part("rockfall_addon.scene.picks.places")
+    pictures, clicks = part("rockfall_addon.scene.footage.pictures"), part("rockfall_addon.scene.footage.clicks")
     editing = part("rockfall_addon.steps.picking.editing")
     model = part("core.camera.model")
     truth = np.array(local(rows("impacts.csv")[3], "x_m", "y_m", "z_m"))
@@ -282,11 +286,11 @@ def test_two_views_make_one_point(site, part) -> None:
 
 def test_the_triangulated_point_has_the_normal_of_the_terrain_there(site, part, numbers) -> None:
     """A normal that came with the pick is of its old place."""
-    new_videos = part("rockfall_addon.scene.new_videos")
-    clocks = part("rockfall_addon.scene.clocks")
-    camera_paths = part("rockfall_addon.scene.camera_paths")
-    places = part("rockfall_addon.scene.places")
-    pictures, editing = part("rockfall_addon.scene.pictures"), part("rockfall_addon.steps.picking.editing")
+    new_videos = part("rockfall_addon.scene.footage.new_videos")
+    clocks = part("rockfall_addon.scene.footage.clocks")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
+    places = part("rockfall_addon.scene.picks.places")
+    pictures, editing = part("rockfall_addon.scene.footage.pictures"), part("rockfall_addon.steps.picking.editing")
     model, raycast = part("core.camera.model"), part("core.terrain.raycast")
     row = rows("impacts.csv")[3]
     truth, moment = np.array(local(row, "x_m", "y_m", "z_m")), float(row["time_s"])
@@ -296,7 +300,10 @@ def test_the_triangulated_point_has_the_normal_of_the_terrain_there(site, part, 
     lens = model.look_at(1280, 720, np.add(truth, (70, -40, 30)), truth, focal_px=2000)
     lens = replace(lens, shift=part("core.georeference").GlobalShift(*ORIGIN))
     camera_paths.set_camera_path(site, second, part("core.camera.path").fixed(lens))
-    add, surface = part("rockfall_addon.scene.picks").add_pick, part("rockfall_addon.scene.reconstruction").ground(site)
+    add, surface = (
+        part("rockfall_addon.scene.picks.picks").add_pick,
+        part("rockfall_addon.scene.picks.reconstruction").ground(site),
+    )
     for seconds, away in ((-0.8, 6.0), (0.8, -6.0)):  # so that the impact has both velocities
         place = raycast.closest_points(surface, truth + np.array([0.0, away, 0.0])).point[0]
         add(site, "B10", OFFSET_S + moment + seconds, place)
@@ -326,16 +333,16 @@ def test_proposals_are_the_first_picks_of_the_same_project(site, part, tmp_path)
     frame, time = np.array([int(row["frame"]) for row in block]), np.array([float(row["time_s"]) for row in block])
     one = np.ones(len(block))
     track = tracking.BlockTrack(frame, time, pixel, 0.1 * one, one, pixel, 9 * one, ("", ""))
-    part("rockfall_addon.scene.sightings").keep_track(camera, "B10", track)
+    part("rockfall_addon.scene.footage.sightings").keep_track(camera, "B10", track)
     site.rockfall_picking.trajectory = "B10"
     assert bpy.ops.rockfall.propose_impacts() == {"FINISHED"}
-    made = part("rockfall_addon.scene.picks").picks_of(site)
+    made = part("rockfall_addon.scene.picks.picks").picks_of(site)
 
     size = dict.fromkeys(("d1_m", "d2_m", "d3_m"), 0.39)
     project = exchange.Project(
         terrain=exchange.TerrainSource((DEMO / "terrain.ply",), shift=tuple(ORIGIN)),
         block=exchange.BlockEntry(**size),
-        videos=part("rockfall_addon.scene.project_videos").write_videos(site, tmp_path),
+        videos=part("rockfall_addon.scene.footage.project_videos").write_videos(site, tmp_path),
     )
     surface = part("core.workflow.opening").open_terrain(project)
     first = part("core.workflow.footage").picks_from_footage(project, surface)
@@ -350,7 +357,7 @@ def test_proposals_are_the_first_picks_of_the_same_project(site, part, tmp_path)
 
 def test_clicked_and_proposed_observations(site, part) -> None:
     """The true pixels, as a track: its kinks are the true impacts."""
-    tracking, sightings = part("core.footage.tracking"), part("rockfall_addon.scene.sightings")
+    tracking, sightings = part("core.footage.tracking"), part("rockfall_addon.scene.footage.sightings")
     tracks = part("rockfall_addon.steps.picking.tracks")
     camera = camera_of(site, part)
     block = [row for row in rows("block.csv") if row["visible"] == "1" and float(row["time_s"]) < 5.0]
@@ -362,7 +369,7 @@ def test_clicked_and_proposed_observations(site, part) -> None:
     sightings.click(camera, "B10", int(frame[3]), float(time[3]), pixel[3] + 0.25, 0.5)
     assert tracks.clicks_for(site, camera, "B10") == [(int(frame[3]), *(pixel[3] + 0.25))]
     site.frame_set(60)
-    places, editing = part("rockfall_addon.scene.places"), part("rockfall_addon.steps.picking.editing")
+    places, editing = part("rockfall_addon.scene.picks.places"), part("rockfall_addon.steps.picking.editing")
     place = places.in_picture(site, camera, np.array([700.0, 300.0]), "B10", centre=True)
     obj, _ = editing.make_or_move(site, camera, place, "B10", "impact")
     assert (60, 700.0, 300.0) in tracks.clicks_for(site, camera, "B10"), "a pick's click begins a track, too"
@@ -391,14 +398,14 @@ def test_operators_tell_what_is_missing(part) -> None:
     scene = bpy.context.scene
     assert not bpy.ops.rockfall.remove_pick.poll()
     assert not bpy.ops.rockfall.drag_pick.poll()
-    places = part("rockfall_addon.scene.places")
+    places = part("rockfall_addon.scene.picks.places")
     with pytest.raises(part("core.errors").RockfallError, match="no terrain to pick on"):
         places.on_ray(scene, np.zeros(3), np.array([0.0, 0, -1]), "B01")
 
 
 def test_the_block_is_tracked(site, part) -> None:
     """From one rough click, through thirty pictures: the operator as it runs without a window."""
-    sightings = part("rockfall_addon.scene.sightings")
+    sightings = part("rockfall_addon.scene.footage.sightings")
     camera = camera_of(site, part)
     site.frame_set(60)
     sightings.click(camera, "B10", 60, 2.0, np.array([862.0, 143.0]), 1.0)
@@ -413,7 +420,7 @@ def test_the_block_is_tracked(site, part) -> None:
     assert np.median(off) < 2.5, "its sunny side is 1 to 2 px from its centre"
     assert seen.frame.min() >= 45
     assert seen.frame.max() <= 75
-    alignment, paths = (part(f"rockfall_addon.scene.{name}") for name in ("alignment", "camera_paths"))
+    alignment, paths = (part(f"rockfall_addon.scene.{name}") for name in ("footage.alignment", "footage.camera_paths"))
     assert alignment.background_remarks(camera) == (), "the camera is known to move"
     held, truth = part("core.camera.path"), paths.camera_path(camera)
     camera.rockfall_alignment.motion = "FIXED"
@@ -438,9 +445,9 @@ def test_near_and_far_ground_that_move_differently_are_told(
         cv2.circle(picture, (30 + 8 * frame, 40 + 4 * frame), 9, (255, 255, 255), -1)
         writer.write(picture)
     writer.release()
-    camera = part("rockfall_addon.scene.new_videos").add_video(scene, film)
+    camera = part("rockfall_addon.scene.footage.new_videos").add_video(scene, film)
     scene.camera = camera
-    part("rockfall_addon.scene.sightings").click(camera, "B1", 10, 10 / 30, np.array([110.0, 80.0]), 1.0)
+    part("rockfall_addon.scene.footage.sightings").click(camera, "B1", 10, 10 / 30, np.array([110.0, 80.0]), 1.0)
     scene.rockfall_picking.trajectory, scene.rockfall_picking.whole_video = "B1", True
     assert bpy.ops.rockfall.track_block() == {"FINISHED"}
     told = capfd.readouterr().out
@@ -450,9 +457,9 @@ def test_near_and_far_ground_that_move_differently_are_told(
 
 def test_the_guide_leads_through_the_synchronisation_of_two_videos(site, part) -> None:
     following, scene = part("rockfall_addon.scene.next_step"), site
-    first = part("rockfall_addon.scene.videos").cameras(scene)[0]
-    second = part("rockfall_addon.scene.new_videos").add_video(scene, FOOTAGE / "footage.mp4")
-    camera_paths = part("rockfall_addon.scene.camera_paths")
+    first = part("rockfall_addon.scene.footage.videos").cameras(scene)[0]
+    second = part("rockfall_addon.scene.footage.new_videos").add_video(scene, FOOTAGE / "footage.mp4")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
     camera_paths.set_camera_path(scene, second, camera_paths.camera_path(first))
     scene.camera = first
     for camera in (first, second):

@@ -29,7 +29,13 @@ def test_one_picture_brings_its_whole_sequence(part: Part, tmp_path: Path) -> No
     assert bpy.ops.rockfall.add_video(filepath=str(chosen), pictures_per_second=25.0) == {"FINISHED"}
     videos, video_files, clocks, footage, project_videos = (
         part(f"rockfall_addon.scene.{name}")
-        for name in ("videos", "video_files", "clocks", "footage", "project_videos")
+        for name in (
+            "footage.videos",
+            "footage.video_files",
+            "footage.clocks",
+            "footage.footage",
+            "footage.project_videos",
+        )
     )
     camera = videos.active_camera(scene())
     np.testing.assert_allclose(videos.times_of(camera), np.array([0, 1, 2, 4, 5]) / 25)
@@ -51,7 +57,7 @@ def test_one_picture_brings_its_whole_sequence(part: Part, tmp_path: Path) -> No
 def test_the_stream_that_is_used_is_shown_in_front_of_blenders_own(part: Part) -> None:
     """Blender plays the first stream of a file; the pictures that count are those of the second."""
     assert bpy.ops.rockfall.add_video(filepath=str(FIELD / "09-second-stream" / "two.mkv")) == {"FINISHED"}
-    videos, footage = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.footage")
+    videos, footage = part("rockfall_addon.scene.footage.videos"), part("rockfall_addon.scene.footage.footage")
     camera = videos.active_camera(scene())
     assert videos.size_of(camera) == (320, 180)
     footage.follow(scene())
@@ -63,11 +69,11 @@ def test_the_stream_that_is_used_is_shown_in_front_of_blenders_own(part: Part) -
 def test_a_named_capture_rate_is_offered_and_taken_over(part: Part) -> None:
     path = FIELD / "16-capture-fps-tag" / "slow_meta.mp4"
     assert bpy.ops.rockfall.add_video(filepath=str(path)) == {"FINISHED"}
-    videos, wording = part("rockfall_addon.scene.videos"), part("rockfall_addon.steps.videos.wording")
+    videos, wording = part("rockfall_addon.scene.footage.videos"), part("rockfall_addon.steps.videos.wording")
     camera = videos.active_camera(scene())
     assert "240 pictures a second were taken" in wording.remarks(camera)[0].text
     assert bpy.ops.rockfall.use_named_capture_rate() == {"FINISHED"}
-    assert part("rockfall_addon.scene.clocks").clock_of(camera).rate == pytest.approx(1 / 8)
+    assert part("rockfall_addon.scene.footage.clocks").clock_of(camera).rate == pytest.approx(1 / 8)
     assert not any("were taken" in remark.text for remark in wording.remarks(camera))
     with pytest.raises(RuntimeError, match="names no other capture rate"):
         bpy.ops.rockfall.use_named_capture_rate()
@@ -75,6 +81,6 @@ def test_a_named_capture_rate_is_offered_and_taken_over(part: Part) -> None:
 
 def test_repeated_pictures_are_said(part: Part) -> None:
     assert bpy.ops.rockfall.add_video(filepath=str(FIELD / "04-repeated-frames" / "dup23.mp4")) == {"FINISHED"}
-    camera = part("rockfall_addon.scene.videos").active_camera(scene())
+    camera = part("rockfall_addon.scene.footage.videos").active_camera(scene())
     said = [remark.text for remark in part("rockfall_addon.steps.videos.wording").remarks(camera)]
     assert any("every 5th: about 24 pictures a second are stored as 30" in text for text in said)

@@ -34,13 +34,15 @@ def truth() -> list[dict[str, str]]:
 def site(part, truth) -> bpy.types.Scene:
     """Terrain, the true camera, a track of true pixels with 0.3 px of noise, picks 15 cm and 20 ms off."""
     scene = bpy.context.scene
-    new_videos = part("rockfall_addon.scene.new_videos")
-    clocks = part("rockfall_addon.scene.clocks")
-    camera_paths = part("rockfall_addon.scene.camera_paths")
+    new_videos = part("rockfall_addon.scene.footage.new_videos")
+    clocks = part("rockfall_addon.scene.footage.clocks")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
     surface = part("core.terrain.readers").read_terrain(
         DEMO / "terrain.ply", shift=part("core.georeference").GlobalShift(*ORIGIN)
     )
-    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    part("rockfall_addon.scene.terrain.terrain").add_terrain(
+        scene, surface, part("core.terrain.shading").shade(surface)
+    )
     camera = new_videos.add_video(scene, FOOTAGE / "footage.mp4")
     scene["rockfall_time_origin_s"] = OFFSET_S
     poses = rows("camera.csv")
@@ -58,12 +60,12 @@ def site(part, truth) -> bpy.types.Scene:
     scene.rockfall.normal_radius_m = 0.6
 
     random = np.random.default_rng(5)
-    add = part("rockfall_addon.scene.picks").add_pick
+    add = part("rockfall_addon.scene.picks.picks").add_pick
     for row in truth:
         spot = local(row, "contact_x_m", "contact_y_m", "contact_z_m") + random.normal(0, 0.15, 3)
         closest = part("core.terrain.raycast").closest_points(surface, spot).point[0]
         add(scene, "B10", OFFSET_S + float(row["time_s"]) + random.normal(0, 0.02), closest)
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     bpy.context.view_layer.update()
     return scene
 
@@ -78,10 +80,10 @@ def tracked(site, part, truth) -> bpy.types.Scene:
     frame, time = np.array([int(row["frame"]) for row in block]), np.array([float(row["time_s"]) for row in block])
     one = np.ones(len(block))
     track = part("core.footage.tracking").BlockTrack(frame, time, pixel, 0.3 * one, one, pixel, 9 * one, ("", ""))
-    (camera,) = part("rockfall_addon.scene.videos").cameras(site)
+    (camera,) = part("rockfall_addon.scene.footage.videos").cameras(site)
     site.rockfall_terrain.accuracy_m = 0.02
     camera.rockfall_video.row_time_us = 0.0
-    part("rockfall_addon.scene.sightings").keep_track(camera, "B10", track)
+    part("rockfall_addon.scene.footage.sightings").keep_track(camera, "B10", track)
     return site
 
 
@@ -98,7 +100,7 @@ def times_off(scene: bpy.types.Scene, truth) -> np.ndarray:
 
 
 def test_what_is_missing_is_said(site, part) -> None:
-    proposal = part("rockfall_addon.scene.proposal")
+    proposal = part("rockfall_addon.scene.picks.proposal")
     assert "Track the block" in proposal.lacking(site)
     assert not bpy.ops.rockfall.refine.poll()
     for obj in picks_of(site):
@@ -107,7 +109,7 @@ def test_what_is_missing_is_said(site, part) -> None:
 
 
 def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth, numbers) -> None:
-    proposal = part("rockfall_addon.scene.proposal")
+    proposal = part("rockfall_addon.scene.picks.proposal")
     before = [list(obj["rockfall_position_m"]) for obj in picks_of(tracked)]
     off = times_off(tracked, truth)
     assert bpy.ops.rockfall.refine() == {"FINISHED"}
@@ -144,11 +146,11 @@ def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth, nu
 
 def test_picks_that_were_changed_meanwhile_are_not_refined(tracked, part) -> None:
     """The fit runs beside Blender: a person goes on with the picks it began with."""
-    proposal, fitting = part("rockfall_addon.scene.proposal"), part("rockfall_addon.steps.refinement.fitting")
+    proposal, fitting = part("rockfall_addon.scene.picks.proposal"), part("rockfall_addon.steps.refinement.fitting")
     work = fitting.work(tracked, None, [])
     found = work.compute(lambda *_: None)
     picks_of(tracked)[2].location.x += 0.5
-    part("rockfall_addon.scene.sync").sync(tracked)
+    part("rockfall_addon.scene.footage.sync").sync(tracked)
     with pytest.raises(part("core.errors").RockfallError, match="changed while they were refined"):
         work.keep(tracked, found)
     assert proposal.read(tracked) is None
@@ -156,7 +158,7 @@ def test_picks_that_were_changed_meanwhile_are_not_refined(tracked, part) -> Non
 
 def test_what_is_applied_fits_the_pixels(tracked, part) -> None:
     """Refined once more, nothing moves: the scene's picks are those of the core's result."""
-    proposal = part("rockfall_addon.scene.proposal")
+    proposal = part("rockfall_addon.scene.picks.proposal")
     bpy.ops.rockfall.refine()
     first = proposal.read(tracked).changes
     place, _, _ = proposal.path(tracked)
@@ -170,9 +172,9 @@ def test_what_is_applied_fits_the_pixels(tracked, part) -> None:
 
 def test_pixels_of_pictures_without_a_pose_are_not_used(tracked, part) -> None:
     """Where nothing of the background was recognised, the pose is a guess."""
-    proposal = part("rockfall_addon.scene.proposal")
-    videos = part("rockfall_addon.scene.videos")
-    camera_paths = part("rockfall_addon.scene.camera_paths")
+    proposal = part("rockfall_addon.scene.picks.proposal")
+    videos = part("rockfall_addon.scene.footage.videos")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
     bpy.ops.rockfall.refine()
     whole = proposal.read(tracked)
     (camera,) = videos.cameras(tracked)
@@ -212,14 +214,14 @@ def test_the_guide_tells_of_an_impact_that_the_track_shows_and_the_picks_lack(tr
     gone = picks_of(tracked)[1]
     bpy.data.objects.remove(gone)
     bpy.context.view_layer.update()
-    part("rockfall_addon.scene.sync").sync(tracked)
+    part("rockfall_addon.scene.footage.sync").sync(tracked)
     step = following.next_step(tracked)
     assert "px off the flights" in step.sentence
     assert "rockfall.export_tables" not in step.actions
 
 
 def test_discarding_and_changing(tracked, part) -> None:
-    proposal = part("rockfall_addon.scene.proposal")
+    proposal = part("rockfall_addon.scene.picks.proposal")
     kept = [dict(obj.items()).keys() for obj in picks_of(tracked)]
     bpy.ops.rockfall.refine()
     bpy.ops.rockfall.discard_refinement()
@@ -238,7 +240,7 @@ def test_discarding_and_changing(tracked, part) -> None:
 def test_gravity_can_be_checked(tracked, part) -> None:
     tracked.rockfall_picking.free = {"gravity"}
     bpy.ops.rockfall.refine()
-    (name, value, sigma) = part("rockfall_addon.scene.proposal").read(tracked).unknowns[0]
+    (name, value, sigma) = part("rockfall_addon.scene.picks.proposal").read(tracked).unknowns[0]
     assert name == "gravity_mps2"
     assert abs(value - 9.81) < max(4 * sigma, 0.05)
     bpy.ops.rockfall.apply_refinement()
@@ -247,7 +249,7 @@ def test_gravity_can_be_checked(tracked, part) -> None:
 
 def test_what_is_drawn_over_the_footage(tracked, part, truth) -> None:
     """After refinement the outline lies on the true block, in pixels of a hand-held picture."""
-    view, videos = part("rockfall_addon.view.footage_view"), part("rockfall_addon.scene.videos")
+    view, videos = part("rockfall_addon.view.footage_view"), part("rockfall_addon.scene.footage.videos")
     bpy.ops.rockfall.refine()
     bpy.ops.rockfall.apply_refinement()
     (camera,) = videos.cameras(tracked)
@@ -268,16 +270,16 @@ def test_what_is_drawn_over_the_footage(tracked, part, truth) -> None:
 
 
 def test_sightings_beyond_the_path_are_not_joined_with_it(tracked, part) -> None:
-    view, clocks = (part(f"rockfall_addon.{name}") for name in ("view.footage_view", "scene.clocks"))
-    (camera,) = part("rockfall_addon.scene.videos").cameras(tracked)
+    view, clocks = (part(f"rockfall_addon.{name}") for name in ("view.footage_view", "scene.footage.clocks"))
+    (camera,) = part("rockfall_addon.scene.footage.videos").cameras(tracked)
     first, *_, last = picks_of(tracked)
     bpy.data.objects.remove(last)
-    part("rockfall_addon.scene.sync").sync(tracked)
+    part("rockfall_addon.scene.footage.sync").sync(tracked)
     end = picks_of(tracked)[-1]["rockfall_time_s"]
     tracked.frame_set(60)
     lines = view.draw(tracked, camera, first).lines
     joined = [one.segments for one in lines if tuple(one.colour[0, 0]) == (*view.SEEN, 0.8)]
-    seen = part("rockfall_addon.scene.sightings").seen_in(camera, "B10")
+    seen = part("rockfall_addon.scene.footage.sightings").seen_in(camera, "B10")
     common = clocks.clock_of(camera).to_common(seen.time_s)
     within = (common >= first["rockfall_time_s"]) & (common <= end)
     assert 0 < within.sum() < len(seen) - 5
@@ -300,7 +302,7 @@ def test_paths_bend_with_the_lens(part) -> None:
 def test_motion_graphs_show_how_far_the_track_lies_from_the_motion(tracked, part, truth) -> None:
     """Far before the refinement, hardly more than the noise of the pixels after it."""
     graphs = part("core.analysis.motion_graphs")
-    motion = part("rockfall_addon.scene.motion")
+    motion = part("rockfall_addon.scene.models.motion")
 
     def residual() -> np.ndarray:
         (course,) = motion.motion_of(tracked).courses
@@ -315,6 +317,6 @@ def test_motion_graphs_show_how_far_the_track_lies_from_the_motion(tracked, part
     np.testing.assert_array_equal(residual(), before)  # a proposal changes nothing yet
     assert bpy.ops.rockfall.apply_refinement() == {"FINISHED"}
     assert np.nanmedian(residual()) < 2.0
-    (camera,) = part("rockfall_addon.scene.videos").cameras(tracked)
-    part("rockfall_addon.scene.sightings").clear(camera, "B10")
+    (camera,) = part("rockfall_addon.scene.footage.videos").cameras(tracked)
+    part("rockfall_addon.scene.footage.sightings").clear(camera, "B10")
     assert motion.motion_of(tracked).courses[0].residuals == ()

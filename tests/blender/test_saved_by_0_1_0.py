@@ -66,12 +66,12 @@ def stored(obj: bpy.types.ID) -> dict:
 
 
 def all_picks(part, scene: bpy.types.Scene) -> list[dict]:
-    picks = part("rockfall_addon.scene.picks")
+    picks = part("rockfall_addon.scene.picks.picks")
     return [stored(obj) for obj in picks.ordered(scene, picks.objects_of(scene))]
 
 
 def test_every_pick_is_identical(opened, part, old) -> None:
-    picks, clicks = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.clicks")
+    picks, clicks = part("rockfall_addon.scene.picks.picks"), part("rockfall_addon.scene.footage.clicks")
     found = all_picks(part, opened)
     assert len(found) == 18
     for new, before in zip(found, old["picks"], strict=True):
@@ -85,7 +85,7 @@ def test_every_pick_is_identical(opened, part, old) -> None:
 
 
 def test_every_result_is_equal(opened, part, old) -> None:
-    impacts = part("rockfall_addon.scene.reconstruction").reconstruct_scene(opened).impacts
+    impacts = part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(opened).impacts
     for name, before in old["impacts"].items():
         if name != "sigma":
             same(plain(getattr(impacts, name)), before, 1e-9, name)
@@ -95,7 +95,7 @@ def test_every_result_is_equal(opened, part, old) -> None:
         same(sigma[name], old["impacts"]["sigma"][name], 1e-9, name)
     for name in ("kinetic1_j", "kinetic2_j"):  # drawn, where 0.1.0 took derivatives
         same(sigma[name], old["impacts"]["sigma"][name], 0.01, name)
-    proposal = plain(part("rockfall_addon.scene.proposal").read(opened))
+    proposal = plain(part("rockfall_addon.scene.picks.proposal").read(opened))
     for name in ("before_px", "after_px", "pixels", "outliers", "by_video", "stale"):
         same(proposal[name], old["proposal"][name], where=name)
     same([list(change.values()) for change in proposal["changes"]], old["proposal"]["picks"])
@@ -106,11 +106,11 @@ def test_every_result_is_equal(opened, part, old) -> None:
 
 
 def test_cameras_pairs_and_clocks_are_identical(opened, part, old) -> None:
-    videos = part("rockfall_addon.scene.videos")
-    camera_paths = part("rockfall_addon.scene.camera_paths")
-    clocks = part("rockfall_addon.scene.clocks")
-    video_files = part("rockfall_addon.scene.video_files")
-    alignment = part("rockfall_addon.scene.alignment")
+    videos = part("rockfall_addon.scene.footage.videos")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
+    clocks = part("rockfall_addon.scene.footage.clocks")
+    video_files = part("rockfall_addon.scene.footage.video_files")
+    alignment = part("rockfall_addon.scene.footage.alignment")
     cameras = videos.cameras(opened)
     assert [camera.name for camera in cameras] == sorted(old["cameras"])
     for camera in cameras:
@@ -129,8 +129,8 @@ def test_cameras_pairs_and_clocks_are_identical(opened, part, old) -> None:
         solution = plain(alignment.solution_of(camera))
         for name in ("rmse_px", "residual", "residual_m", "wrong", "sigma", "reference", "keys"):
             same(solution[name], before["solution"][name], where=name)
-        same(plain(part("rockfall_addon.scene.video_times").events_of(camera)), before["events"])
-        sightings = part("rockfall_addon.scene.sightings")
+        same(plain(part("rockfall_addon.scene.footage.video_times").events_of(camera)), before["events"])
+        sightings = part("rockfall_addon.scene.footage.sightings")
         seen = {name: plain(sightings.seen_in(camera, name)) for name in sightings.names_in(camera)}
         same(seen, before["seen"])
         for name, value in before["settings"].items():
@@ -154,15 +154,15 @@ def test_settings_models_and_film_are_as_they_were(opened, part, old) -> None:
         for name, value in before.items():
             now = getattr(settings, name)
             same(plain(sorted(now) if isinstance(now, set) else now), value, where=name)
-    shift = part("rockfall_addon.scene.georeference").read_shift(opened)
+    shift = part("rockfall_addon.scene.terrain.georeference").read_shift(opened)
     same([*shift.vector.tolist(), shift.crs], old["shift"])
-    project = part("rockfall_addon.scene.reconstruction").project_settings(opened, ["B02", "B07", "B10"])
+    project = part("rockfall_addon.scene.picks.reconstruction").project_settings(opened, ["B02", "B07", "B10"])
     block = plain(project.block)
     assert block.pop("shape") == "ellipsoid"  # there was no other
     same(plain(project.reconstruction) | {"block": block}, old["reconstruction"])
-    tiles = part("rockfall_addon.scene.terrain").tiles(opened)
+    tiles = part("rockfall_addon.scene.terrain.terrain").tiles(opened)
     assert [[len(tile.data.vertices), len(tile.data.polygons)] for tile in tiles] == old["terrain"]
-    assert list(part("rockfall_addon.scene.models").shown_models(opened)) == old["models"]
+    assert list(part("rockfall_addon.scene.models.models").shown_models(opened)) == old["models"]
     assert part("rockfall_addon.steps.film.remembered").is_set_up(opened) is old["film"] is True
     named = [
         [named_by_0_1_0(o), str(o.get("rockfall_role", "")), str(o.get("rockfall_trajectory", ""))]
@@ -182,15 +182,14 @@ def test_numbers_of_impacts_come_over(opened, numbers, old) -> None:
         assert now[name]["rockfall_flags"] == kept["flags"]
         found = {key: np.atleast_1d(value).tolist() for key, value in numbers(now[name]).items() if key in kept}
         same(found, {key: np.atleast_1d(kept[key]).tolist() for key in found}, 1e-9, name)
-        of_contact = {f"interval_{name}_contact" for name in ("rn", "rt", "theta1")}  # which are no longer given
-        assert set(kept) - set(found) == {"flags"} | of_contact
+        assert set(kept) - set(found) == {"flags"}
 
 
 def test_files_hold_the_numbers_of_an_impact_in_this_order(part) -> None:
     """Another order needs another schema, and a step to it."""
     judged = ("rn", "rt", "r", "theta1", "theta_dev")
     deviations = ("rn", "rt", "r", "theta1_deg", "theta_dev_deg", "speed1", "speed2", "kinetic1_j", "kinetic2_j")
-    assert list(part("rockfall_addon.scene.impact_numbers").SHAPE) == [
+    assert list(part("rockfall_addon.scene.picks.impact_numbers").SHAPE) == [
         "number", "incident_mps", "restituted_mps", "rn", "rt", "r", "theta1_deg", "theta_dev_deg", "normal_spread_deg",
         "kinetic1_j", "kinetic2_j", "bounce_height_m", "chord_height_m", *(f"sigma_{name}" for name in deviations),
         *(f"interval_{name}" for name in judged),
@@ -198,7 +197,7 @@ def test_files_hold_the_numbers_of_an_impact_in_this_order(part) -> None:
 
 
 def test_numbers_that_cannot_be_computed_anew_come_over(scene, part, numbers, old) -> None:
-    migration, pick = part("rockfall_addon.scene.migration"), scene.objects["A impact 1"]
+    migration, pick = part("rockfall_addon.scene.storage.migration"), scene.objects["A impact 1"]
     kept = next(each["rockfall_result"] for each in old["picks"] if "rockfall_result" in each)
     pick["rockfall_result"], pick["rockfall_flags"] = kept, "gone"
     broken = scene.objects["A impact 2"]
@@ -210,16 +209,26 @@ def test_numbers_that_cannot_be_computed_anew_come_over(scene, part, numbers, ol
     assert numbers(pick)["kinetic2_j"] == pytest.approx(kept["kinetic2_j"][0], nan_ok=True)
     assert np.isnan(numbers(pick)["interval_rn"]).all(), "0.1.0 had none"
     assert numbers(broken) is None
-    assert scene["rockfall_schema"] == 2
+    assert scene["rockfall_schema"] == 3
+
+
+def test_numbers_of_an_impact_lose_the_intervals_that_they_ended_with(scene, part, numbers) -> None:
+    pick = scene.objects["A impact 1"]
+    known = pick["rockfall_result"].to_list()
+    pick["rockfall_result"] = [*known, 0.1, 0.9, 0.2, 0.8, 0.3, 0.7]
+    scene["rockfall_schema"] = 2
+    assert part("rockfall_addon.scene.storage.migration").migrate(scene)
+    np.testing.assert_array_equal(pick["rockfall_result"].to_list(), known)
+    assert scene["rockfall_schema"] == 3
 
 
 def test_it_can_be_edited_and_saved_again(opened, part, old, tmp_path: Path, numbers) -> None:
-    picks, store = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.store")
+    picks, store = part("rockfall_addon.scene.picks.picks"), part("rockfall_addon.scene.storage.store")
     _, second, *_ = picks.ordered(opened, picks.objects_of(opened, ["B07"]))
     before = stored(second)
     incident = numbers(second)["incident_mps"]
     second[store.TIME] = before["rockfall_time_s"] + 0.02
-    part("rockfall_addon.scene.sync").sync(opened)
+    part("rockfall_addon.scene.footage.sync").sync(opened)
     after = stored(second)
     assert after["rockfall_key_frame"] == pytest.approx(before["rockfall_key_frame"] + 0.6, abs=1e-4)
     assert numbers(second)["incident_mps"] != incident
@@ -238,7 +247,7 @@ def test_it_can_be_edited_and_saved_again(opened, part, old, tmp_path: Path, num
 
 def test_keys_of_its_blocks_drive_their_picks(opened, part, old) -> None:
     """0.1.0 did not keep which pick a key is of."""
-    picks, store = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.store")
+    picks, store = part("rockfall_addon.scene.picks.picks"), part("rockfall_addon.scene.storage.store")
     (block,) = [o for o in store.with_role(opened, store.BLOCK_ROLE) if o[store.TRAJECTORY] == "B10"]
     moved = picks.ordered(opened, picks.objects_of(opened, ["B10"]))[1]
     before = stored(moved)

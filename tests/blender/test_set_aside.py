@@ -102,7 +102,7 @@ CASES = {
     "written text": (of_pick("written", "x"), "rockfall_written of A impact 1 ('x')", ALL),
     "result text": (of_pick("result", "x"), "rockfall_result of A impact 1 ('x')", ALL),
     "result too short": (of_pick("result", [1.0] * 3), "rockfall_result of A impact 1", ALL),
-    "result of no impact": (of_pick("result", [NAN] * 42), "is of no impact", ALL),
+    "result of no impact": (of_pick("result", [NAN] * 36), "is of no impact", ALL),
     "flags a number": (of_pick("flags", 1), "rockfall_flags of A impact 1 (1) is no text", ALL),
     "shift of pick nan": (of_pick("pick_shift_m", [NAN, 0.0, 0.0]), "rockfall_pick_shift_m of A impact 1", ALL),
     "id gone": (of_pick("id", None), "", ALL),
@@ -269,12 +269,12 @@ def test_what_is_set_aside_is_selected_and_deleted(scene: bpy.types.Scene, part,
 def test_one_bad_trajectory_stops_nothing_that_is_made_of_the_others(slope: bpy.types.Scene, part) -> None:
     same_time(slope)
     assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
-    result, left_out = part("rockfall_addon.scene.reconstruction").reconstruct_good(slope)
+    result, left_out = part("rockfall_addon.scene.picks.reconstruction").reconstruct_good(slope)
     assert set(result.picks.trajectory.tolist()) == {"B"}
     assert [remark.about for remark in left_out] == ["A"]
     assert bpy.ops.rockfall.show_models(models={"noel_2017"}) == {"FINISHED"}
     slope.rockfall_simulation.source = "MEASURED"
-    plan = part("rockfall_addon.scene.simulation_setup").plan(slope)
+    plan = part("rockfall_addon.scene.simulation.simulation_setup").plan(slope)
     assert set(plan.origins) == {"B"}
     assert [remark.about for remark in plan.remarks] == ["A"]
 
@@ -300,14 +300,14 @@ def test_a_marker_that_is_nowhere_goes_back(scene: bpy.types.Scene, part) -> Non
     ],
 )
 def test_a_damaged_camera(part, tmp_path: Path, key: str, value: object, words: str, aside: bool, is_solved) -> None:
-    camera_paths, camera = part("rockfall_addon.scene.camera_paths"), add(part, "constant.mp4")
+    camera_paths, camera = part("rockfall_addon.scene.footage.camera_paths"), add(part, "constant.mp4")
     camera_paths.set_camera_path(bpy.context.scene, camera, solved(part, camera, 20))
     write(camera, key, value)
     scene = opened(tmp_path / "damaged.blend")
     said = said_of(scene, part)
     assert words in said
     assert "Something went wrong" not in said
-    found = part("rockfall_addon.scene.videos").cameras(scene)
+    found = part("rockfall_addon.scene.footage.videos").cameras(scene)
     assert [camera_paths.is_solved(each) for each in found] == ([] if aside else [is_solved])
     scene.frame_set(5)
     assert "Something went wrong" not in said_of(scene, part)
@@ -315,7 +315,7 @@ def test_a_damaged_camera(part, tmp_path: Path, key: str, value: object, words: 
 
 def test_poses_that_are_not_known_are_no_damage(part, tmp_path: Path) -> None:
     """Where the background is not recognised a pose's standard deviation is infinite, and so is one from few pairs."""
-    camera_paths, camera = part("rockfall_addon.scene.camera_paths"), add(part, "constant.mp4")
+    camera_paths, camera = part("rockfall_addon.scene.footage.camera_paths"), add(part, "constant.mp4")
     path = solved(part, camera, 20)
     sigma = path.sigma_rotation.copy()
     sigma[3:6] = np.inf
@@ -325,7 +325,7 @@ def test_poses_that_are_not_known_are_no_damage(part, tmp_path: Path) -> None:
     )
     scene = opened(tmp_path / "unknown.blend")
     assert "Set aside" not in said_of(scene, part)
-    (found,) = part("rockfall_addon.scene.videos").cameras(scene)
+    (found,) = part("rockfall_addon.scene.footage.videos").cameras(scene)
     kept = camera_paths.camera_path(found).sigma_rotation
     assert np.flatnonzero(np.isinf(kept)).tolist() == [3, 4, 5]
     assert camera_paths.pose_covariance(found) is None

@@ -19,7 +19,7 @@ def other(request: pytest.FixtureRequest, scene: bpy.types.Scene) -> bpy.types.S
 
 def look(part, *scenes: bpy.types.Scene) -> None:
     for each in scenes:
-        part("rockfall_addon.scene.sync").sync(each)
+        part("rockfall_addon.scene.footage.sync").sync(each)
 
 
 @pytest.mark.parametrize("first", [0, 1])
@@ -74,4 +74,4 @@ def test_its_name_is_its_number_in_the_scene_that_keeps_it(
     pick = picks_of(scene, "A")[2]
     look(part, scene, other)
     assert pick.name == "A impact 2", "not 1, which it would be in the other scene"
-    assert not part("rockfall_addon.scene.sync").sync(other).step_changed
+    assert not part("rockfall_addon.scene.footage.sync").sync(other).step_changed

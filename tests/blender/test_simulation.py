@@ -17,7 +17,7 @@ SINGLE_M = 2e-4
 def drawn(scan: bpy.types.Scene, part) -> bpy.types.Scene:
     """A line near the top, from which eight blocks of two models start."""
     points = [np.array([6.0, y, 91.5]) for y in (20.0, 60.0, 100.0)]
-    line = part("rockfall_addon.scene.drawn_releases").make(scan, "line", points)
+    line = part("rockfall_addon.scene.simulation.drawn_releases").make(scan, "line", points)
     settings = scan.rockfall_simulation
     settings.source, settings.drawn, settings.number, settings.seed = "DRAWN", line, 8, 3
     settings.models = MODELS
@@ -42,7 +42,7 @@ def places(scene: bpy.types.Scene, obj: bpy.types.Object) -> np.ndarray:
 
 def exact(part, scene: bpy.types.Scene) -> dict[str, object]:
     """What the core simulates from the scene's settings, asked directly."""
-    setup = part("rockfall_addon.scene.simulation_setup")
+    setup = part("rockfall_addon.scene.simulation.simulation_setup")
     plan = setup.plan(scene)
     return {one.settings.model: one for one in part("core.workflow.simulation").run_scenario(plan.scenario)}
 
@@ -96,13 +96,13 @@ def test_a_saved_file_shows_the_same_and_simulates_the_same_again(drawn: bpy.typ
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
     scene = bpy.context.scene
     check_motion(part, scene, simulations)
-    assert not part("rockfall_addon.scene.simulation_setup").is_stale(scene)
+    assert not part("rockfall_addon.scene.simulation.simulation_setup").is_stale(scene)
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     again = {model: path_points(obj) for model, obj in of_role(scene, "simulated_paths").items()}
     for model, points in before.items():
         np.testing.assert_array_equal(again[model], points)
     scene.rockfall_simulation.seed = 4
-    assert part("rockfall_addon.scene.simulation_setup").is_stale(scene)
+    assert part("rockfall_addon.scene.simulation.simulation_setup").is_stale(scene)
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     other = path_points(of_role(scene, "simulated_paths")["noel_2017"])
     assert other.shape != before["noel_2017"].shape or not np.array_equal(other, before["noel_2017"])
@@ -119,7 +119,7 @@ def test_numbers_of_a_run_are_those_of_the_core(drawn: bpy.types.Scene, part) ->
     simulation = exact(part, drawn)["stevens_1998"]
     settings = drawn.rockfall_simulation
     settings.run_model, settings.run = "stevens_1998", 5
-    rows = dict(part("rockfall_addon.scene.simulation").selected_run(drawn))
+    rows = dict(part("rockfall_addon.scene.simulation.simulation").selected_run(drawn))
     way = simulation.position[4] - simulation.releases.position[4]
     assert rows["Run"] == "5 of 8"
     assert rows["Release"] == "Release line"
@@ -129,11 +129,11 @@ def test_numbers_of_a_run_are_those_of_the_core(drawn: bpy.types.Scene, part) ->
     assert bpy.ops.rockfall.next_run(step=-1) == {"FINISHED"}
     assert settings.run == 4
     settings.run = 9
-    assert part("rockfall_addon.scene.simulation").selected_run(drawn) is None, "there are eight"
+    assert part("rockfall_addon.scene.simulation.simulation").selected_run(drawn) is None, "there are eight"
 
 
 def test_what_decides_is_told_when_it_has_changed(drawn: bpy.types.Scene, part) -> None:
-    stale = part("rockfall_addon.scene.simulation_setup").is_stale
+    stale = part("rockfall_addon.scene.simulation.simulation_setup").is_stale
     assert not stale(drawn), "nothing is shown yet"
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     assert not stale(drawn)
@@ -156,12 +156,12 @@ def test_what_decides_is_told_when_it_has_changed(drawn: bpy.types.Scene, part) 
 
 
 def test_parameters_are_the_scenes_own(drawn: bpy.types.Scene, part) -> None:
-    models = part("rockfall_addon.scene.models")
+    models = part("rockfall_addon.scene.models.models")
     group = drawn.rockfall_parameters.noel_2017
     group.rt = 0.35
     group.transfer_basis = "energy"
     assert models.parameters_of(drawn) == {"noel_2017": {"rt": 0.35, "transfer_basis": "energy"}}, "in full digits"
-    scenario = part("rockfall_addon.scene.simulation_setup").plan(drawn).scenario
+    scenario = part("rockfall_addon.scene.simulation.simulation_setup").plan(drawn).scenario
     assert scenario.models["noel_2017"] == {"rt": 0.35, "transfer_basis": "energy"}
     group.rt = 5e9
     spec = part("core.impact_models.registry").MODELS["noel_2017"].parameter("rt")
@@ -183,8 +183,8 @@ def test_measured_blocks_start_beside_the_real_ones(part) -> None:
     for playback in ("TOGETHER", "REAL"):
         scene.rockfall.playback = playback
         real = {o["rockfall_trajectory"]: o for o in scene.objects if o.get("rockfall_role") == "block"}
-        offsets = part("rockfall_addon.scene.timing").kept_offsets(scene)
-        result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
+        offsets = part("rockfall_addon.scene.footage.timing").kept_offsets(scene)
+        result = part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(scene)
         for name in ("B01", "B05"):
             first = result.picks.time_s[result.picks.trajectory == name].min() - offsets[name] + 0.2
             frame = first * scene.render.fps / scene.render.fps_base
@@ -209,8 +209,8 @@ def test_one_pick_can_be_the_source(part) -> None:
     blocks = of_role(scene, "simulated_blocks")["noel_2017"]
     starts = np.array([vertex.co for vertex in blocks.data.vertices])
     assert np.linalg.norm(starts - np.array(pick["rockfall_position_m"]), axis=1).min() < 0.5
-    begin = part("rockfall_addon.scene.simulation").release_begins(scene, blocks)
-    offset = part("rockfall_addon.scene.timing").kept_offsets(scene)["B03"]
+    begin = part("rockfall_addon.scene.simulation.simulation").release_begins(scene, blocks)
+    offset = part("rockfall_addon.scene.footage.timing").kept_offsets(scene)["B03"]
     np.testing.assert_allclose(begin, pick["rockfall_time_s"] - offset)
 
 
@@ -225,7 +225,7 @@ def test_one_pick_can_be_the_source(part) -> None:
 )
 def test_what_is_missing_is_said_before(drawn: bpy.types.Scene, part, change, words: str) -> None:
     change(drawn.rockfall_simulation)
-    assert words in part("rockfall_addon.scene.simulation_setup").missing(drawn)
+    assert words in part("rockfall_addon.scene.simulation.simulation_setup").missing(drawn)
     assert not bpy.ops.rockfall.simulate.poll()
 
 
@@ -250,7 +250,7 @@ def test_a_deleted_terrain_leaves_what_is_shown_and_says_so(drawn: bpy.types.Sce
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     bpy.data.objects.remove(next(obj for obj in drawn.objects if obj.get("rockfall_role") == "terrain"))
     assert len(of_role(drawn, "simulated_blocks")) == 2
-    assert part("rockfall_addon.scene.simulation_setup").is_stale(drawn)
+    assert part("rockfall_addon.scene.simulation.simulation_setup").is_stale(drawn)
     assert bpy.types.ROCKFALL_PT_simulation.poll(bpy.context)
     assert bpy.ops.rockfall.remove_simulation() == {"FINISHED"}
     assert not bpy.types.ROCKFALL_PT_simulation.poll(bpy.context)
@@ -263,7 +263,7 @@ def test_without_terrain_there_is_nothing_to_fall_on(drawn: bpy.types.Scene) -> 
 
 
 def test_a_cancel_keeps_what_is_finished_and_says_so(drawn: bpy.types.Scene, part) -> None:
-    setup, errors = part("rockfall_addon.scene.simulation_setup"), part("core.progress")
+    setup, errors = part("rockfall_addon.scene.simulation.simulation_setup"), part("core.progress")
     drawn.rockfall_simulation.number = 400
     plan = setup.plan(drawn)
 
@@ -275,7 +275,7 @@ def test_a_cancel_keeps_what_is_finished_and_says_so(drawn: bpy.types.Scene, par
     prepared, remarks = found.prepared, found.remarks
     assert prepared[0].model == "noel_2017"
     assert "Stopped by you" in remarks[0].text
-    part("rockfall_addon.scene.simulation").show_prepared(drawn, prepared, plan.origins)
+    part("rockfall_addon.scene.simulation.simulation").show_prepared(drawn, prepared, plan.origins)
     setup.keep(drawn, plan.said, remarks)
     assert "Stopped by you" in setup.remarks(drawn)[0].text
     counts = {model: len(obj.data.curves) for model, obj in of_role(drawn, "simulated_paths").items()}
@@ -321,7 +321,7 @@ def test_own_drawings_are_read(scan: bpy.types.Scene, part, kind: str) -> None:
     scan.collection.objects.link(obj)
     obj.location.z = 1.0
     bpy.context.view_layer.update()
-    found, points = part("rockfall_addon.scene.drawn_releases").read(obj)
+    found, points = part("rockfall_addon.scene.simulation.drawn_releases").read(obj)
     assert found == expected[0]
     assert {tuple(p) for p in points.tolist()} == {(x, y, z + 1.0) for x, y, z in expected[1]}
     if found == "line":
@@ -349,7 +349,7 @@ def test_a_project_takes_the_settings_along(part, tmp_path: Path, source: str, r
     elif source == "steep":
         settings.source, settings.steeper_than_deg = "STEEP", 33.0
     scene.rockfall_parameters.noel_2017.rt = 0.41
-    sources = part("rockfall_addon.scene.simulated_sources")
+    sources = part("rockfall_addon.scene.simulation.simulated_sources")
     stated = sources.entry_of(scene)
     assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
     read = part("core.exchange.project").read_project(tmp_path / "out" / "project.toml")
@@ -365,7 +365,7 @@ def test_a_project_takes_the_settings_along(part, tmp_path: Path, source: str, r
     assert (again.models, again.seed, again.friction, again.rolling) == (
         stated.models, stated.seed, stated.friction, stated.rolling,
     )  # fmt: skip
-    assert part("rockfall_addon.scene.models").parameters_of(scene)["noel_2017"] == {"rt": 0.41}
+    assert part("rockfall_addon.scene.models.models").parameters_of(scene)["noel_2017"] == {"rt": 0.41}
 
 
 def test_tables_are_of_the_shown_runs_in_survey_coordinates(drawn: bpy.types.Scene, part, tmp_path: Path) -> None:
@@ -394,13 +394,13 @@ def test_blocks_meet_the_points_of_the_terrain_where_that_is_chosen(drawn: bpy.t
     settings.models, settings.number = {"noel_2017"}, 4
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     settings.contact = "points"
-    assert part("rockfall_addon.scene.simulation_setup").is_stale(drawn)
+    assert part("rockfall_addon.scene.simulation.simulation_setup").is_stale(drawn)
     with pytest.raises(RuntimeError, match="would hang on single points"):
         bpy.ops.rockfall.simulate()
     settings.diameter_m = 12.0
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     assert "Blocks meet the points of the terrain, 2" in " ".join(
-        remark.text for remark in part("rockfall_addon.scene.simulation_setup").remarks(drawn)
+        remark.text for remark in part("rockfall_addon.scene.simulation.simulation_setup").remarks(drawn)
     )
     assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
@@ -412,7 +412,7 @@ def test_a_seed_that_blender_cannot_hold_is_said(scan: bpy.types.Scene, part) ->
     """A property of Blender has 32 bits, a project 63."""
     entry, sources = (
         part("core.exchange.simulation_entry").SimulationEntry,
-        part("rockfall_addon.scene.simulated_sources"),
+        part("rockfall_addon.scene.simulation.simulated_sources"),
     )
     scan.rockfall_simulation.seed = 5
     assert "the seed 2147483648, which is above 2147483647" in sources.keep_entry(scan, entry(seed=2**31))
@@ -424,19 +424,19 @@ def test_a_seed_that_blender_cannot_hold_is_said(scan: bpy.types.Scene, part) ->
 def test_the_mesh_is_checked_where_that_is_asked_for(drawn: bpy.types.Scene, part) -> None:
     def of_mesh() -> list[str]:
         assert bpy.ops.rockfall.simulate() == {"FINISHED"}
-        found = part("rockfall_addon.scene.simulation_setup").remarks(drawn)
+        found = part("rockfall_addon.scene.simulation.simulation_setup").remarks(drawn)
         return [one.text for one in found if "divided" in one.text]
 
     assert not of_mesh()
     drawn.rockfall_simulation.check_mesh = True
-    plan = part("rockfall_addon.scene.simulation_setup").plan(drawn)
+    plan = part("rockfall_addon.scene.simulation.simulation_setup").plan(drawn)
     ground = part("core.workflow.simulation").ground_of(plan.scenario)
     check = part("core.workflow.mesh_check")
     changes = check.mesh_changes(plan.scenario, ground, plan.scenario.releases(ground))
     assert {one.model for one in changes} == MODELS
     assert set(of_mesh()) == {one.text for one in check.change_remarks(changes)}
     drawn.rockfall_simulation.contact = "points"
-    assert not part("rockfall_addon.scene.simulation_setup").plan(drawn).check_mesh, "points have no mesh"
+    assert not part("rockfall_addon.scene.simulation.simulation_setup").plan(drawn).check_mesh, "points have no mesh"
 
 
 @pytest.mark.parametrize(("contact", "diameter"), [("mesh", 0.5), ("points", 12.0)])

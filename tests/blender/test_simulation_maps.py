@@ -14,7 +14,10 @@ def slope(scan: bpy.types.Scene, part) -> bpy.types.Scene:
     """The rough slope, with a line near its top from which blocks start."""
     points = [np.array([6.0, y, 91.5]) for y in (20.0, 60.0, 100.0)]
     settings = scan.rockfall_simulation
-    settings.source, settings.drawn = "DRAWN", part("rockfall_addon.scene.drawn_releases").make(scan, "line", points)
+    settings.source, settings.drawn = (
+        "DRAWN",
+        part("rockfall_addon.scene.simulation.drawn_releases").make(scan, "line", points),
+    )
     settings.map_number, settings.seed, settings.map_cell_m = 150, 3, 4.0
     return scan
 
@@ -26,18 +29,18 @@ def mapped(slope: bpy.types.Scene) -> bpy.types.Scene:
 
 
 def kept(part, scene: bpy.types.Scene):
-    maps = part("rockfall_addon.scene.hazard_maps")
+    maps = part("rockfall_addon.scene.simulation.hazard_maps")
     return maps.read(maps.maps_of(scene))
 
 
 def said(part, scene: bpy.types.Scene) -> str:
-    return " ".join(remark.text for remark in part("rockfall_addon.scene.hazard_maps").remarks(scene))
+    return " ".join(remark.text for remark in part("rockfall_addon.scene.simulation.hazard_maps").remarks(scene))
 
 
 def test_the_maps_are_those_of_the_core(mapped: bpy.types.Scene, part) -> None:
     """Against runs that are simulated at once, and cells that are looked up in plain NumPy."""
-    setup, maps = part("rockfall_addon.scene.simulation_setup"), kept(part, mapped)
-    sources = part("rockfall_addon.scene.simulated_sources")
+    setup, maps = part("rockfall_addon.scene.simulation.simulation_setup"), kept(part, mapped)
+    sources = part("rockfall_addon.scene.simulation.simulated_sources")
     scenario = setup.plan(mapped, sources.entry_with(mapped, ["noel_2017"], 150)).scenario
     (simulation,) = part("core.workflow.simulation").run_scenario(scenario)
     cells = maps.cells
@@ -60,18 +63,18 @@ def test_maps_are_saved_and_undone(mapped: bpy.types.Scene, tmp_path: Path, part
     path = tmp_path / "maps.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     assert bpy.ops.rockfall.remove_maps() == {"FINISHED"}
-    assert part("rockfall_addon.scene.hazard_maps").maps_of(mapped) is None
+    assert part("rockfall_addon.scene.simulation.hazard_maps").maps_of(mapped) is None
     bpy.ops.wm.open_mainfile(filepath=str(path))
     scene = bpy.context.scene
     again = kept(part, scene)
     assert again.layers.keys() == before.keys() == part("core.hazard.maps").LAYERS.keys()
     for name, values in before.items():
         np.testing.assert_array_equal(again.layers[name], values)
-    assert not part("rockfall_addon.scene.hazard_maps").is_stale(scene)
+    assert not part("rockfall_addon.scene.simulation.hazard_maps").is_stale(scene)
 
 
 def test_changes_make_maps_old_and_others_do_not(mapped: bpy.types.Scene, part) -> None:
-    maps, settings = part("rockfall_addon.scene.hazard_maps"), mapped.rockfall_simulation
+    maps, settings = part("rockfall_addon.scene.simulation.hazard_maps"), mapped.rockfall_simulation
     settings.number, settings.models, settings.map_layer = 7, {"stevens_1998"}, "E_95CI"
     assert not maps.is_stale(mapped), "what the paths are of, and which map is shown"
     for name, value in (("map_number", 151), ("map_cell_m", 3.0), ("seed", 4), ("friction", 0.9)):
@@ -95,19 +98,19 @@ def test_the_probe_tells_the_numbers_of_the_cell(mapped: bpy.types.Scene, part) 
     assert energy[table[0].index("max")] == f"{maps.layers['E_max'][row, column]:.3g}"
     empty = np.argwhere(np.isnan(maps.layers["Nr_blocks"]))[0]
     assert probe.card_of(maps, *empty) == (["No block enters this cell of 4 m."], [])
-    where = part("rockfall_addon.scene.hazard_maps").cell_at
+    where = part("rockfall_addon.scene.simulation.hazard_maps").cell_at
     x, y = maps.cells.x0_m + 4.0 * column + 0.1, maps.cells.y0_m + 4.0 * row + 3.9
     assert where(maps.cells, np.array([x, y, 0.0])) == (row, column)
     assert where(maps.cells, np.array([maps.cells.x0_m - 0.1, y, 0.0])) is None
 
 
 def test_maps_that_cannot_be_are_set_aside(mapped: bpy.types.Scene, tmp_path: Path, part) -> None:
-    obj = part("rockfall_addon.scene.hazard_maps").maps_of(mapped)
+    obj = part("rockfall_addon.scene.simulation.hazard_maps").maps_of(mapped)
     obj["rockfall_map_cells"] = [0.0, 0.0, -1.0, 5.0, 5.0]
     path = str(tmp_path / "damaged.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.open_mainfile(filepath=path)
-    assert part("rockfall_addon.scene.hazard_maps").maps_of(bpy.context.scene) is None
+    assert part("rockfall_addon.scene.simulation.hazard_maps").maps_of(bpy.context.scene) is None
     assert any("Maps" in obj.name for obj in bpy.context.scene.objects)
 
 
@@ -129,7 +132,7 @@ def test_maps_are_exported(mapped: bpy.types.Scene, tmp_path: Path, part) -> Non
 
 def test_faces_are_mapped_beside_the_cells(mapped: bpy.types.Scene, part, tmp_path: Path) -> None:
     """Against the same runs, counted by the core; after saving, too."""
-    module = part("rockfall_addon.scene.hazard_maps")
+    module = part("rockfall_addon.scene.simulation.hazard_maps")
     found = module.faces_of(mapped)
     asked = module.plan(mapped)
     ground = part("core.workflow.simulation").ground_of(asked.plan.scenario)
@@ -169,7 +172,7 @@ def test_faces_are_mapped_beside_the_cells(mapped: bpy.types.Scene, part, tmp_pa
 
 def test_the_probe_tells_the_numbers_of_the_face(mapped: bpy.types.Scene, part) -> None:
     probe = part("rockfall_addon.steps.simulation.face_overlay")
-    faces = part("rockfall_addon.scene.hazard_maps").faces_of(mapped)
+    faces = part("rockfall_addon.scene.simulation.hazard_maps").faces_of(mapped)
     row = int(np.nanargmax(faces.layers["Nr_contacts"]))
     middle = faces.corners[row].mean(axis=0)
     above = middle + np.array([0.0, 0.0, 30.0])
@@ -185,9 +188,9 @@ def test_the_probe_tells_the_numbers_of_the_face(mapped: bpy.types.Scene, part) 
 
 def test_maps_mean_the_same_with_and_without_barriers(mapped: bpy.types.Scene, part) -> None:
     """A drawn barrier changes no map by itself; with *With Barriers* fewer blocks come below it."""
-    maps, screens = part("rockfall_addon.scene.hazard_maps"), part("rockfall_addon.scene.screens")
+    maps, screens = part("rockfall_addon.scene.simulation.hazard_maps"), part("rockfall_addon.scene.simulation.screens")
     plain = np.nan_to_num(kept(part, mapped).layers["Nr_blocks"]).copy()
-    surface = part("rockfall_addon.scene.reconstruction").ground(mapped)
+    surface = part("rockfall_addon.scene.picks.reconstruction").ground(mapped)
     screen = part("core.hazard.screens").Screen("net", np.array([[30.0, -10.0], [30.0, 130.0]]), 3.0, 1e9)
     screens.keep(mapped, screen, surface)
     assert bpy.ops.rockfall.compute_maps() == {"FINISHED"}
@@ -203,7 +206,7 @@ def test_maps_mean_the_same_with_and_without_barriers(mapped: bpy.types.Scene, p
 
 
 def test_what_says_little_is_kept_with_the_maps(mapped: bpy.types.Scene, part, tmp_path: Path) -> None:
-    maps = part("rockfall_addon.scene.hazard_maps")
+    maps = part("rockfall_addon.scene.simulation.hazard_maps")
     few = part("core.hazard.evidence").FEW
     mapped.rockfall_simulation.map_number, mapped.rockfall_simulation.map_cell_m = 300, 10.0
     assert bpy.ops.rockfall.compute_maps() == {"FINISHED"}

@@ -15,7 +15,10 @@ def slope(scan: bpy.types.Scene, part) -> bpy.types.Scene:
     """The rough slope, which runs out from x = 60 on, and a line near its top, from which forty blocks start."""
     points = [np.array([6.0, y, 91.5]) for y in (20.0, 60.0, 100.0)]
     settings = scan.rockfall_simulation
-    settings.source, settings.drawn = "DRAWN", part("rockfall_addon.scene.drawn_releases").make(scan, "line", points)
+    settings.source, settings.drawn = (
+        "DRAWN",
+        part("rockfall_addon.scene.simulation.drawn_releases").make(scan, "line", points),
+    )
     settings.number, settings.seed, settings.models = 40, 3, {"noel_2017"}
     return scan
 
@@ -24,7 +27,7 @@ def slope(scan: bpy.types.Scene, part) -> bpy.types.Scene:
 def screen(slope: bpy.types.Scene, part) -> bpy.types.Object:
     """A line with a corner across the foot of the slope."""
     points = [np.array([FOOT_X, y, 20.0]) for y in (-1.0, 60.0, 121.0)]
-    return part("rockfall_addon.scene.screens").make(slope, points, "road")
+    return part("rockfall_addon.scene.simulation.screens").make(slope, points, "road")
 
 
 def paths(scene: bpy.types.Scene) -> list[np.ndarray]:
@@ -37,7 +40,7 @@ def paths(scene: bpy.types.Scene) -> list[np.ndarray]:
 
 
 def result(part, scene: bpy.types.Scene) -> dict[str, object]:
-    (found,) = part("rockfall_addon.scene.simulation_setup").screen_results(scene)
+    (found,) = part("rockfall_addon.scene.simulation.simulation_setup").screen_results(scene)
     return found
 
 
@@ -49,13 +52,13 @@ def test_a_screen_counts_the_paths_that_cross_it(slope: bpy.types.Scene, screen:
     assert beyond > 3
     value, low, _high = found["energy_kj"]
     assert 0 < low <= value
-    ((title, rows),) = part("rockfall_addon.scene.screens").result_rows([found], "road")
+    ((title, rows),) = part("rockfall_addon.scene.simulation.screens").result_rows([found], "road")
     assert title == part("core.impact_models.registry").MODELS["noel_2017"].title
     assert dict(rows)["Blocks that come"].startswith(f"{beyond} of 40")
 
 
 def test_a_barrier_ends_the_shown_runs_that_it_holds(slope: bpy.types.Scene, screen: bpy.types.Object, part) -> None:
-    setup = part("rockfall_addon.scene.simulation_setup")
+    setup = part("rockfall_addon.scene.simulation.simulation_setup")
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     before = result(part, slope)
     screen.rockfall_screen.holds = True
@@ -82,28 +85,28 @@ def test_screens_are_saved_with_what_was_found(
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
     scene = bpy.context.scene
-    assert not part("rockfall_addon.scene.simulation_setup").is_stale(scene)
+    assert not part("rockfall_addon.scene.simulation.simulation_setup").is_stale(scene)
     assert result(part, scene) == before
-    (again,) = part("rockfall_addon.scene.screens").screens_of(scene)
+    (again,) = part("rockfall_addon.scene.simulation.screens").screens_of(scene)
     assert (again.name, again.height_m, again.capacity_j) == ("road", 3.0, 750_000.0)
     np.testing.assert_allclose(again.line, [[FOOT_X, -1.0], [FOOT_X, 60.0], [FOOT_X, 121.0]])
     assert bpy.ops.rockfall.remove_screen(name="road") == {"FINISHED"}
-    assert not part("rockfall_addon.scene.screens").objects_of(scene)
+    assert not part("rockfall_addon.scene.simulation.screens").objects_of(scene)
 
 
 def test_the_fence_stands_on_the_terrain(slope: bpy.types.Scene, screen: bpy.types.Object, part) -> None:
-    foot = part("rockfall_addon.scene.screens").fence(slope, screen)
+    foot = part("rockfall_addon.scene.simulation.screens").fence(slope, screen)
     there = np.isfinite(foot[:, 2])
-    surface = part("rockfall_addon.scene.terrain").surface_of_scene(slope)
+    surface = part("rockfall_addon.scene.terrain.terrain").surface_of_scene(slope)
     above = part("core.terrain.raycast").heights_above(surface, foot[there] + [0.0, 0.0, 1.0])
     np.testing.assert_allclose(above, 1.0, atol=1e-4)
     assert 0 < (~there).sum() < 10, "its ends are beside the terrain"
 
 
 def test_what_is_no_screen_is_refused(slope: bpy.types.Scene, screen: bpy.types.Object, part) -> None:
-    setup = part("rockfall_addon.scene.simulation_setup")
+    setup = part("rockfall_addon.scene.simulation.simulation_setup")
     with pytest.raises(part("core.errors").RockfallError, match="two points"):
-        part("rockfall_addon.scene.screens").make(slope, [np.zeros(3)])
+        part("rockfall_addon.scene.simulation.screens").make(slope, [np.zeros(3)])
     screen.location.x = 500.0
     bpy.context.view_layer.update()
     with pytest.raises(RuntimeError, match="'road' is beside the terrain"):
@@ -131,7 +134,7 @@ def test_a_project_takes_screens_along(slope: bpy.types.Scene, screen: bpy.types
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     assert bpy.ops.rockfall.open_project(filepath=str(project)) == {"FINISHED"}
     scene = bpy.context.scene
-    (again,) = part("rockfall_addon.scene.screens").screens_of(scene)
+    (again,) = part("rockfall_addon.scene.simulation.screens").screens_of(scene)
     assert (again.name, again.height_m, again.capacity_j) == ("road", 3.0, 750_000.0)
     np.testing.assert_allclose(again.line, [[FOOT_X, -1.0], [FOOT_X, 60.0], [FOOT_X, 121.0]], atol=1e-5)
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
@@ -141,7 +144,7 @@ def test_a_project_takes_screens_along(slope: bpy.types.Scene, screen: bpy.types
 def test_the_design_sheet_of_a_drawn_screen(
     slope: bpy.types.Scene, screen: bpy.types.Object, part, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(part("rockfall_addon.scene.design_sheet"), "is_there", lambda extra: False)
+    monkeypatch.setattr(part("rockfall_addon.scene.simulation.design_sheet"), "is_there", lambda extra: False)
     out = tmp_path / "sheet"
     screen.rockfall_screen.holds = True
     assert bpy.ops.rockfall.design_sheet(directory=str(out), factors="none", holdout=False) == {"FINISHED"}
@@ -156,12 +159,12 @@ def test_the_design_sheet_of_a_drawn_screen(
 def test_a_barrier_is_green_only_while_it_is_known_to_be_enough(
     slope: bpy.types.Scene, screen: bpy.types.Object, part
 ) -> None:
-    screens, fences = part("rockfall_addon.scene.screens"), part("rockfall_addon.steps.simulation.fences")
+    screens, fences = part("rockfall_addon.scene.simulation.screens"), part("rockfall_addon.steps.simulation.fences")
     settings, simulated = screen.rockfall_screen, slope.rockfall_simulation
     settings.holds, settings.height_m, settings.capacity_kj = True, 60.0, 1e6
 
     def shown() -> tuple[str, tuple[float, ...]]:
-        results = part("rockfall_addon.scene.simulation_setup").screen_results(slope)
+        results = part("rockfall_addon.scene.simulation.simulation_setup").screen_results(slope)
         ((_, rows),) = screens.result_rows(results, "road")
         return dict(rows)["Verdict (95 %)"], fences._colour(screen, results)
 

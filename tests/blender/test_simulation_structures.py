@@ -15,7 +15,10 @@ def slope(scan: bpy.types.Scene, part) -> bpy.types.Scene:
     """The rough slope, which runs out from x = 60 on, and a line near its top, from which eight blocks start."""
     points = [np.array([6.0, y, 91.5]) for y in (20.0, 60.0, 100.0)]
     settings = scan.rockfall_simulation
-    settings.source, settings.drawn = "DRAWN", part("rockfall_addon.scene.drawn_releases").make(scan, "line", points)
+    settings.source, settings.drawn = (
+        "DRAWN",
+        part("rockfall_addon.scene.simulation.drawn_releases").make(scan, "line", points),
+    )
     settings.number, settings.seed, settings.models = 8, 3, {"noel_2017"}
     return scan
 
@@ -47,18 +50,18 @@ def farthest(scene: bpy.types.Scene) -> float:
 
 
 def said(part, scene: bpy.types.Scene) -> str:
-    return " ".join(remark.text for remark in part("rockfall_addon.scene.simulation_setup").remarks(scene))
+    return " ".join(remark.text for remark in part("rockfall_addon.scene.simulation.simulation_setup").remarks(scene))
 
 
 def test_a_structure_across_the_slope_holds_blocks(slope: bpy.types.Scene, wall: bpy.types.Object, part) -> None:
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     assert farthest(slope) > WALL_X + 1, "an object that is not marked is no obstacle"
     assert use(wall) == {"FINISHED"}
-    assert part("rockfall_addon.scene.simulation_setup").is_stale(slope)
+    assert part("rockfall_addon.scene.simulation.simulation_setup").is_stale(slope)
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     assert farthest(slope) < WALL_X + 1e-3
     simulations = part("core.workflow.simulation").run_scenario(
-        part("rockfall_addon.scene.simulation_setup").plan(slope).scenario
+        part("rockfall_addon.scene.simulation.simulation_setup").plan(slope).scenario
     )
     assert simulations[0].ends[-1] == "structure:wall"
     records = simulations[0].records
@@ -69,16 +72,16 @@ def test_a_structure_across_the_slope_holds_blocks(slope: bpy.types.Scene, wall:
     assert f"{blocks} of 8 blocks with Noël et al. 2017 hit wall, {times} times; 0 of them went on" in said(part, slope)
     wall.location.x += 200.0
     bpy.context.view_layer.update()
-    assert part("rockfall_addon.scene.simulation_setup").is_stale(slope)
+    assert part("rockfall_addon.scene.simulation.simulation_setup").is_stale(slope)
     with pytest.raises(RuntimeError, match="structure wall stands nowhere near"):
         bpy.ops.rockfall.simulate()
     wall.location.x -= 200.0
     bpy.context.view_layer.update()
-    assert not part("rockfall_addon.scene.simulation_setup").is_stale(slope)
+    assert not part("rockfall_addon.scene.simulation.simulation_setup").is_stale(slope)
     wall.data.vertices[0].co.z -= 0.1
     wall.data.update()
     bpy.context.view_layer.update()
-    assert part("rockfall_addon.scene.simulation_setup").is_stale(slope), "its mesh was edited"
+    assert part("rockfall_addon.scene.simulation.simulation_setup").is_stale(slope), "its mesh was edited"
     assert bpy.ops.rockfall.remove_structure(name="wall") == {"FINISHED"}
     assert wall.name in slope.objects
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
@@ -87,14 +90,17 @@ def test_a_structure_across_the_slope_holds_blocks(slope: bpy.types.Scene, wall:
 
 def test_a_structure_is_taken_where_its_matrix_puts_it(slope: bpy.types.Scene, wall: bpy.types.Object, part) -> None:
     use(wall)
-    structure = part("rockfall_addon.scene.simulation_setup").plan(slope).scenario.structures["wall"]
+    structure = part("rockfall_addon.scene.simulation.simulation_setup").plan(slope).scenario.structures["wall"]
     corners = {(WALL_X, y, z) for y in (59.0 - 65.0, 59.0 + 65.0) for z in (-20.0, 80.0)}
     assert {tuple(corner) for corner in structure.vertices.tolist()} == corners
     assert len(structure.faces) == 2
 
 
 def test_structures_are_saved_and_undone(slope: bpy.types.Scene, wall: bpy.types.Object, part, tmp_path: Path) -> None:
-    structures, setup = part("rockfall_addon.scene.structures"), part("rockfall_addon.scene.simulation_setup")
+    structures, setup = (
+        part("rockfall_addon.scene.simulation.structures"),
+        part("rockfall_addon.scene.simulation.simulation_setup"),
+    )
     bpy.ops.ed.undo_push(message="before")
     use(wall)
     bpy.ops.ed.undo_push(message="marked")
@@ -130,7 +136,7 @@ def test_a_project_takes_structures_along(
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     assert bpy.ops.rockfall.open_project(filepath=str(project)) == {"FINISHED"}
     scene = bpy.context.scene
-    again = part("rockfall_addon.scene.structures").met_of(scene)
+    again = part("rockfall_addon.scene.simulation.structures").met_of(scene)
     assert list(again) == ["wall"]
     np.testing.assert_allclose(again["wall"].bounds, [[WALL_X, -6.0, -20.0], [WALL_X, 124.0, 80.0]], atol=1e-5)
     if with_releases:
@@ -156,7 +162,7 @@ def test_a_cloud_without_faces_is_a_structure_and_goes_along_with_a_project(
     assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     assert bpy.ops.rockfall.open_project(filepath=str(tmp_path / "out" / "project.toml")) == {"FINISHED"}
-    again = part("rockfall_addon.scene.structures").met_of(bpy.context.scene)["net"]
+    again = part("rockfall_addon.scene.simulation.structures").met_of(bpy.context.scene)["net"]
     np.testing.assert_allclose(again.points.min(axis=0), [WALL_X, 0.0, 14.0], atol=1e-5)
     assert len(again.points) == points
 
@@ -170,8 +176,8 @@ def test_what_cannot_be_a_structure_is_refused(slope: bpy.types.Scene, wall: bpy
     slope.collection.objects.link(empty)
     with pytest.raises(RuntimeError, match="nothing that a block could meet"):
         use(wall, empty)
-    assert not part("rockfall_addon.scene.structures").objects_of(slope), "all or none"
+    assert not part("rockfall_addon.scene.simulation.structures").objects_of(slope), "all or none"
     use(wall)
     wall.modifiers.new("thick", "SOLIDIFY")
-    assert "Apply the modifiers" in part("rockfall_addon.scene.simulation_setup").missing(slope)
+    assert "Apply the modifiers" in part("rockfall_addon.scene.simulation.simulation_setup").missing(slope)
     assert not bpy.ops.rockfall.simulate.poll()

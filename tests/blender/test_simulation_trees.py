@@ -13,7 +13,10 @@ def slope(scan: bpy.types.Scene, part) -> bpy.types.Scene:
     """The rough slope, and a line near its top, from which eight blocks start."""
     points = [np.array([6.0, y, 91.5]) for y in (20.0, 60.0, 100.0)]
     settings = scan.rockfall_simulation
-    settings.source, settings.drawn = "DRAWN", part("rockfall_addon.scene.drawn_releases").make(scan, "line", points)
+    settings.source, settings.drawn = (
+        "DRAWN",
+        part("rockfall_addon.scene.simulation.drawn_releases").make(scan, "line", points),
+    )
     settings.number, settings.seed, settings.models = 8, 3, {"noel_2017"}
     return scan
 
@@ -23,7 +26,7 @@ def stems(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def said(part, scene: bpy.types.Scene) -> str:
-    return " ".join(remark.text for remark in part("rockfall_addon.scene.simulation_setup").remarks(scene))
+    return " ".join(remark.text for remark in part("rockfall_addon.scene.simulation.simulation_setup").remarks(scene))
 
 
 def test_a_forest_is_met_and_seen(slope: bpy.types.Scene, part) -> None:
@@ -31,10 +34,10 @@ def test_a_forest_is_met_and_seen(slope: bpy.types.Scene, part) -> None:
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     assert not stems(slope)
     settings.trees, settings.stems_per_hectare, settings.dbh_cm, settings.dbh_sd_cm = "DRAWN", 900.0, 40.0, 0.0
-    assert part("rockfall_addon.scene.simulation_setup").is_stale(slope)
+    assert part("rockfall_addon.scene.simulation.simulation_setup").is_stale(slope)
     assert bpy.ops.rockfall.simulate() == {"FINISHED"}
     (obj,) = stems(slope)
-    trees = part("rockfall_addon.scene.simulation_setup").plan(slope).scenario.trees
+    trees = part("rockfall_addon.scene.simulation.simulation_setup").plan(slope).scenario.trees
     corners = np.empty(3 * len(obj.data.vertices), np.float32)
     obj.data.attributes["position"].data.foreach_get("vector", corners)
     corners = corners.reshape(len(trees), -1, 3)
@@ -56,12 +59,12 @@ def test_a_table_of_trees_goes_along_with_a_project(slope: bpy.types.Scene, part
     settings.trees = "TABLE"
     with pytest.raises(RuntimeError, match="Choose the table of trees"):
         bpy.ops.rockfall.simulate()
-    shift = part("rockfall_addon.scene.georeference").read_shift(slope)
+    shift = part("rockfall_addon.scene.terrain.georeference").read_shift(slope)
     x, y = shift.x + 30.0, shift.y + 60.0
     table = tmp_path / "my trees.csv"
     table.write_text(f"x_m,y_m,dbh_cm,height_m\n{x!r},{y!r},50,12\n", encoding="utf-8")
     settings.trees_file, settings.tree_species = str(table), "broadleaved"
-    trees = part("rockfall_addon.scene.simulation_setup").plan(slope).scenario.trees
+    trees = part("rockfall_addon.scene.simulation.simulation_setup").plan(slope).scenario.trees
     np.testing.assert_allclose(trees.position, [[30.0, 60.0]], atol=1e-6)
     np.testing.assert_allclose(trees.energy_j, 1.59 * 38.7 * 50**2.31)
     projects = part("rockfall_addon.scene.project")
@@ -77,10 +80,10 @@ def test_a_table_of_trees_goes_along_with_a_project(slope: bpy.types.Scene, part
 
 
 def test_another_table_under_the_same_name_is_told(slope: bpy.types.Scene, part, tmp_path: Path) -> None:
-    shift = part("rockfall_addon.scene.georeference").read_shift(slope)
+    shift = part("rockfall_addon.scene.terrain.georeference").read_shift(slope)
     table, settings = tmp_path / "trees.csv", slope.rockfall_simulation
     settings.trees, settings.trees_file = "TABLE", str(table)
-    is_stale = part("rockfall_addon.scene.simulation_setup").is_stale
+    is_stale = part("rockfall_addon.scene.simulation.simulation_setup").is_stale
     for x in (30.0, 40.0):
         table.write_text(f"x_m,y_m,dbh_cm\n{shift.x + x!r},{shift.y + 60.0!r},50\n", encoding="utf-8")
         if x > 30:

@@ -16,7 +16,9 @@ def scan(part) -> bpy.types.Scene:
     shift = part("core.georeference").GlobalShift(2_600_000.0, 1_200_000.0, 0.0)
     surface = part("core.terrain.surface").Surface(np.column_stack([x, y, -0.7 * x]), faces, shift, "scan", ())
     scene = bpy.context.scene
-    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    part("rockfall_addon.scene.terrain.terrain").add_terrain(
+        scene, surface, part("core.terrain.shading").shade(surface)
+    )
     settings = scene.rockfall_simulation
     settings.source, settings.steeper_than_deg, settings.number, settings.models = "STEEP", 20.0, 6, {"noel_2017"}
     return scene
@@ -27,7 +29,7 @@ def tile_of(scene: bpy.types.Scene) -> bpy.types.Object:
 
 
 def plan(part, scene: bpy.types.Scene):
-    return part("rockfall_addon.scene.simulation_setup").plan(scene)
+    return part("rockfall_addon.scene.simulation.simulation_setup").plan(scene)
 
 
 def middles(surface) -> np.ndarray:
@@ -51,7 +53,7 @@ def test_a_vertex_group_and_an_attribute_are_zones(scan: bpy.types.Scene, part) 
     corners = np.array([list(face.vertices) for face in tile.data.polygons])
     chosen = (place[corners].mean(axis=1)[:, 1] < 10) & (place[corners].mean(axis=1)[:, 0] < 35)
     attribute.data.foreach_set("value", chosen)
-    part("rockfall_addon.scene.terrain_mesh").mistrust(tile.data)
+    part("rockfall_addon.scene.terrain.terrain_mesh").mistrust(tile.data)
 
     scenario = plan(part, scan).scenario
     zones, at = scenario.zones, middles(scenario.terrain)
@@ -70,12 +72,12 @@ def test_a_vertex_group_and_an_attribute_are_zones(scan: bpy.types.Scene, part) 
 
 
 def test_zones_that_change_make_the_result_stale(scan: bpy.types.Scene, part) -> None:
-    setup = part("rockfall_addon.scene.simulation_setup")
+    setup = part("rockfall_addon.scene.simulation.simulation_setup")
     tile = tile_of(scan)
     assert bpy.ops.rockfall.add_zone() == {"FINISHED"}
     prints = [setup.fingerprint(scan)]
     tile.vertex_groups[0].add(range(900), 1.0, "REPLACE")
-    part("rockfall_addon.scene.terrain_mesh").mistrust(tile.data)
+    part("rockfall_addon.scene.terrain.terrain_mesh").mistrust(tile.data)
     prints.append(setup.fingerprint(scan))
     scan.rockfall_simulation.zones[0].parameters = "rt = 0.4"
     prints.append(setup.fingerprint(scan))
@@ -94,7 +96,7 @@ def test_a_project_keeps_the_zones(scan: bpy.types.Scene, part, tmp_path) -> Non
         assert bpy.ops.rockfall.add_zone() == {"FINISHED"}
         settings.zones[-1].friction, settings.zones[-1].parameters = friction, parameters
         tile.vertex_groups[settings.zones[-1].name].add(np.flatnonzero(chosen).tolist(), 1.0, "REPLACE")
-    part("rockfall_addon.scene.terrain_mesh").mistrust(tile.data)
+    part("rockfall_addon.scene.terrain.terrain_mesh").mistrust(tile.data)
     before = plan(part, scan).scenario
     path, _ = project.save_project(scan, tmp_path / "project")
 
@@ -119,7 +121,7 @@ def test_zones_that_make_no_sense_are_refused(scan: bpy.types.Scene, part) -> No
     with pytest.raises(error, match="No zone is anywhere on the terrain"):
         plan(part, scan)
     tile_of(scan).vertex_groups[0].add(range(900), 1.0, "REPLACE")
-    part("rockfall_addon.scene.terrain_mesh").mistrust(tile_of(scan).data)
+    part("rockfall_addon.scene.terrain.terrain_mesh").mistrust(tile_of(scan).data)
     zone = scan.rockfall_simulation.zones[0]
     for text, message in (
         ("rtt = 0.4", "Did you mean rt"),

@@ -40,8 +40,8 @@ def impacts() -> list[dict[str, str]]:
 def site(part, impacts) -> bpy.types.Scene:
     """The footage with its true camera, and true picks with their normals; no terrain is needed."""
     scene = bpy.context.scene
-    part("rockfall_addon.scene.georeference").write_shift(scene, part("core.georeference").GlobalShift(*ORIGIN))
-    camera = part("rockfall_addon.scene.new_videos").add_video(scene, DEMO / "footage" / "footage.mp4")
+    part("rockfall_addon.scene.terrain.georeference").write_shift(scene, part("core.georeference").GlobalShift(*ORIGIN))
+    camera = part("rockfall_addon.scene.footage.new_videos").add_video(scene, DEMO / "footage" / "footage.mp4")
     poses = rows("camera.csv")
     place = np.array([local(row, "x_m", "y_m", "z_m") for row in poses])
     turn = np.array([[float(row[f"r{i}{j}"]) for i in "123" for j in "123"] for row in poses]).reshape(-1, 3, 3)
@@ -51,25 +51,25 @@ def site(part, impacts) -> bpy.types.Scene:
     )  # fmt: skip
     times, nothing = np.array([float(row["time_s"]) for row in poses]), np.zeros(len(poses))
     scene["rockfall_time_origin_s"] = OFFSET_S
-    part("rockfall_addon.scene.clocks").set_clock(camera, part("core.footage.clock").Clock(OFFSET_S))
+    part("rockfall_addon.scene.footage.clocks").set_clock(camera, part("core.footage.clock").Clock(OFFSET_S))
     path = part("core.camera.path").CameraPath(lens, times, place, turn, nothing, nothing)
-    part("rockfall_addon.scene.camera_paths").set_camera_path(scene, camera, path)
+    part("rockfall_addon.scene.footage.camera_paths").set_camera_path(scene, camera, path)
     scene.camera = camera
     scene.rockfall.block_diameter_m = 2 * RADIUS
     scene.rockfall_picking.trajectory = NAME
-    picks = part("rockfall_addon.scene.picks")
+    picks = part("rockfall_addon.scene.picks.picks")
     for row in impacts:
         normal = numbers(row, "nx", "ny", "nz")
         obj = picks.add_pick(
             scene, NAME, OFFSET_S + float(row["time_s"]), local(row, "x_m", "y_m", "z_m") - RADIUS * normal
         )
         obj["rockfall_normal"] = normal.tolist()
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     return scene
 
 
 def camera_of(scene: bpy.types.Scene, part) -> bpy.types.Object:
-    return part("rockfall_addon.scene.videos").cameras(scene)[0]
+    return part("rockfall_addon.scene.footage.videos").cameras(scene)[0]
 
 
 def picks_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -79,11 +79,11 @@ def picks_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 def pixels(part, scene: bpy.types.Scene, impacts, flight: int, count: int) -> list[tuple[int, float, np.ndarray]]:
     """Frame, video time and pixel of a point of the true block, in pictures next to one another, on the near side."""
-    camera, pictures = camera_of(scene, part), part("rockfall_addon.scene.pictures")
+    camera, pictures = camera_of(scene, part), part("rockfall_addon.scene.footage.pictures")
     project = part("core.camera.model").project
     omega = numbers(impacts[flight], "omega2x_radps", "omega2y_radps", "omega2z_radps")
     leave, arrive = float(impacts[flight]["leave_time_s"]), float(impacts[flight + 1]["time_s"])
-    times = part("rockfall_addon.scene.videos").times_of(camera)
+    times = part("rockfall_addon.scene.footage.videos").times_of(camera)
     block = {int(row["frame"]): row for row in rows("block.csv")}
     frames = np.flatnonzero((times > leave + 0.1) & (times < arrive))[:count]
     middle = float(times[frames].mean())
@@ -102,7 +102,7 @@ def pixels(part, scene: bpy.types.Scene, impacts, flight: int, count: int) -> li
 
 def mark(part, scene: bpy.types.Scene, marks, **_) -> None:
     """As the tool does, without a window."""
-    spins = part("rockfall_addon.scene.spins")
+    spins = part("rockfall_addon.scene.picks.spins")
     for frame, video_s, pixel in marks:
         spins.mark(camera_of(scene, part), NAME, frame, video_s, pixel, 0.5)
     part("rockfall_addon.steps.spin.operators").follow(scene, NAME)
@@ -110,7 +110,7 @@ def mark(part, scene: bpy.types.Scene, marks, **_) -> None:
 
 def test_the_frame_rate_and_the_count_by_eye(site, part, impacts) -> None:
     """12.3 turns/s at 30 pictures/s: two rates fit, and the one that was counted is the true one."""
-    spins = part("rockfall_addon.scene.spins")
+    spins = part("rockfall_addon.scene.picks.spins")
     mark(part, site, pixels(part, site, impacts, 0, 4))
     ((obj, one),) = spins.of_trajectory(site, NAME)
     assert obj == picks_of(site)[1]
@@ -125,7 +125,7 @@ def test_the_frame_rate_and_the_count_by_eye(site, part, impacts) -> None:
     assert one.verdict == "counted"
     assert abs(one.rate - true) < 2 * one.sigma_rate
     assert 0.01 * true < one.sigma_rate < 0.3 * true
-    measured = part("rockfall_addon.scene.reconstruction").reconstruct_scene(site).impacts
+    measured = part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(site).impacts
     np.testing.assert_allclose(measured.angular_velocity[1], one.omega)
     np.testing.assert_allclose(measured.rotational1_j[1], one.energy_j)
     assert "± " in spins.words(obj)[0][1]
@@ -136,7 +136,7 @@ def test_the_frame_rate_and_the_count_by_eye(site, part, impacts) -> None:
 
 
 def test_marks_move_go_and_follow_the_picks(site, part, impacts) -> None:
-    spins = part("rockfall_addon.scene.spins")
+    spins = part("rockfall_addon.scene.picks.spins")
     made = pixels(part, site, impacts, 0, 3)
     mark(part, site, made)
     bpy.ops.rockfall.count_turns(turns_per_s=12.0, flight=1)
@@ -153,9 +153,9 @@ def test_marks_move_go_and_follow_the_picks(site, part, impacts) -> None:
     assert spins.of(obj).rate != pytest.approx(before)
     site.rockfall.block_diameter_m = 2 * RADIUS
     assert spins.of(obj).rate == pytest.approx(before, rel=1e-6)
-    part("rockfall_addon.scene.sync").nudge(site, obj, 0.3)
+    part("rockfall_addon.scene.footage.sync").nudge(site, obj, 0.3)
     assert spins.of(obj).rate != pytest.approx(before)
-    part("rockfall_addon.scene.sync").nudge(site, obj, -0.3)
+    part("rockfall_addon.scene.footage.sync").nudge(site, obj, -0.3)
     assert spins.of(obj).rate == pytest.approx(before, rel=1e-6)
 
     assert bpy.ops.rockfall.set_spin_axis(axis="sight") == {"FINISHED"}
@@ -169,7 +169,7 @@ def test_marks_move_go_and_follow_the_picks(site, part, impacts) -> None:
 
 
 def test_a_clock_that_has_changed_is_noticed(site, part, impacts) -> None:
-    spins, clocks = part("rockfall_addon.scene.spins"), part("rockfall_addon.scene.clocks")
+    spins, clocks = part("rockfall_addon.scene.picks.spins"), part("rockfall_addon.scene.footage.clocks")
     mark(part, site, pixels(part, site, impacts, 0, 3))
     assert not spins.is_stale(site, NAME)
     clocks.set_clock(camera_of(site, part), part("core.footage.clock").Clock(OFFSET_S + 30.0))
@@ -181,7 +181,7 @@ def test_a_clock_that_has_changed_is_noticed(site, part, impacts) -> None:
 
 
 def test_saved_loaded_and_exported(site, part, impacts, tmp_path) -> None:
-    spins = part("rockfall_addon.scene.spins")
+    spins = part("rockfall_addon.scene.picks.spins")
     mark(part, site, pixels(part, site, impacts, 0, 3))
     mark(part, site, pixels(part, site, impacts, 1, 3)[:1])
     bpy.ops.rockfall.count_turns(turns_per_s=12.0, flight=1)
@@ -225,7 +225,7 @@ def test_what_is_drawn(site, part, impacts) -> None:
     bpy.ops.rockfall.count_turns(turns_per_s=12.0, flight=1)
     camera = camera_of(site, part)
     frame, _, pixel = made[1]
-    site.frame_set(round(part("rockfall_addon.scene.clocks").scene_frame_of(site, camera, frame)))
+    site.frame_set(round(part("rockfall_addon.scene.footage.clocks").scene_frame_of(site, camera, frame)))
     drawn = part("rockfall_addon.view.footage_view").draw(site, camera, None)
     (hand,) = [one for one in drawn.marks if one.shape == "diamond"]
     np.testing.assert_allclose(hand.pixel, pixel)
@@ -235,7 +235,7 @@ def test_what_is_drawn(site, part, impacts) -> None:
 
 
 def test_a_frame_rate_that_cannot_tell_the_turns_is_said_before_anything_is_marked(site, part, monkeypatch) -> None:
-    spins, store = (part(f"rockfall_addon.scene.{name}") for name in ("spins", "store"))
+    spins, store = (part(f"rockfall_addon.scene.{name}") for name in ("picks.spins", "storage.store"))
     camera = camera_of(site, part)
     (flights,) = store.with_role(site, store.FLIGHTS_ROLE)
     flights[store.TOP_SPEED] = 9.0

@@ -71,14 +71,14 @@ def objects(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
 
 def everything(scene: bpy.types.Scene, part, *, ids: bool = True) -> dict[str, object]:
     """All numbers of the state, and of what is computed from it."""
-    picks = part("rockfall_addon.scene.picks").picks_of(scene)
-    reconstruction = part("rockfall_addon.scene.reconstruction")
+    picks = part("rockfall_addon.scene.picks.picks").picks_of(scene)
+    reconstruction = part("rockfall_addon.scene.picks.reconstruction")
     result = reconstruction.reconstruct_scene(scene)
     settings = reconstruction.project_settings(scene, picks.trajectory.tolist())
     names = ("trajectory", "time_s", "position", "kind", "status", "normal", "sigma_time_s", "sigma_position_m")
     found: dict[str, object] = {name: getattr(picks, name).tolist() for name in names}
     found |= {"extra": {n: v.tolist() for n, v in picks.extra.items()}, "shift": picks.shift}
-    found |= {"settings": settings, "models": part("rockfall_addon.scene.models").parameters_of(scene)}
+    found |= {"settings": settings, "models": part("rockfall_addon.scene.models.models").parameters_of(scene)}
     found |= {"rn": np.round(result.impacts.rn, 9).tolist(), "v1": np.round(result.impacts.v1, 9).tolist()}
     if ids:
         found["ids"] = sorted(o["rockfall_id"] for o in objects(scene, "pick"))
@@ -109,7 +109,7 @@ def test_save_and_load(scene: bpy.types.Scene, part, tmp_path: Path) -> None:
     before = everything(scene, part), shown(scene)
     loaded = save_and_load(tmp_path / "a.blend")
     assert (everything(loaded, part), shown(loaded)) == before
-    assert loaded["rockfall_schema"] == 2
+    assert loaded["rockfall_schema"] == 3
     assert before[1] == (10, 2, 2, 6)
 
 
@@ -184,11 +184,11 @@ def test_what_is_deleted_by_hand_comes_again(scene: bpy.types.Scene, part, role:
 def test_a_deleted_marker_mesh_or_group_comes_again(scene: bpy.types.Scene, part) -> None:
     bpy.data.node_groups.remove(bpy.data.node_groups["Rockfall trail"])
     edit(scene)
-    part("rockfall_addon.scene.sync").sync(scene, again=True)
+    part("rockfall_addon.scene.footage.sync").sync(scene, again=True)
     trail = objects(scene, "flights")[0]
     assert trail.modifiers["Trail"].node_group.name == "Rockfall trail"
     bpy.data.meshes["Rockfall impact"].name = "other"
-    part("rockfall_addon.scene.sync").sync(scene, again=True)
+    part("rockfall_addon.scene.footage.sync").sync(scene, again=True)
     assert picks_of(scene, "A")[1].data.name == "Rockfall impact"
 
 
@@ -241,7 +241,7 @@ def test_a_collection_that_an_undo_leaves_outside_of_the_scene_comes_back(scene:
 def test_a_collection_that_was_taken_out_of_the_scene_stays_out_after_an_undo(scene: bpy.types.Scene, part) -> None:
     bpy.ops.ed.undo_push(message="before")
     scene.collection.children.unlink(folder_of("Rockfall"))
-    part("rockfall_addon.scene.sync").sync(scene)
+    part("rockfall_addon.scene.footage.sync").sync(scene)
     bpy.ops.ed.undo_push(message="taken out")
     scene.collection.objects.link(bpy.data.objects.new("other", None))
     bpy.ops.ed.undo_push(message="another")
@@ -256,20 +256,20 @@ def test_a_collection_that_was_taken_out_of_the_scene_stays_out_after_an_undo(sc
 def test_appended_into_a_scene_with_another_origin_and_rate(part, project: Path, tmp_path: Path) -> None:
     scene = bpy.context.scene
     part("rockfall_addon.scene.project").load_project(scene, project)
-    expected = part("rockfall_addon.scene.picks").picks_of(scene)
+    expected = part("rockfall_addon.scene.picks.picks").picks_of(scene)
     survey = expected.shift.to_survey(expected.position)[:5]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     scene = bpy.context.scene
     scene.render.fps = 50
     shift = part("core.georeference").GlobalShift(2600010.0, 1199990.0, 390.0)
-    part("rockfall_addon.scene.georeference").write_shift(scene, shift)
+    part("rockfall_addon.scene.terrain.georeference").write_shift(scene, shift)
     with bpy.data.libraries.load(str(tmp_path / "a.blend")) as (source, target):
         target.objects = [name for name in source.objects if name.startswith("A ")]
     for obj in target.objects:
         scene.collection.objects.link(obj)
     bpy.context.view_layer.update()
-    picks = part("rockfall_addon.scene.picks").picks_of(scene)
+    picks = part("rockfall_addon.scene.picks.picks").picks_of(scene)
     np.testing.assert_array_equal(picks.time_s, expected.time_s[:5])
     np.testing.assert_allclose(picks.shift.to_survey(picks.position), survey, atol=1e-9)
     assert shown(scene)[:3] == (5, 1, 1)
@@ -307,7 +307,7 @@ def test_edits_while_rockfall_was_disabled_are_found(part, installation, project
     picks_of(scene, "A")[1].location.y += 0.2  # after the update, in which Blender may put keyed objects back
     installation.enable()
     if bpy.app.binary_path:  # registering may not touch the data there: a timer does it, which only a window has
-        part("rockfall_addon.scene.sync").sync(scene)
+        part("rockfall_addon.scene.footage.sync").sync(scene)
     assert picks_of(scene, "A")[1]["rockfall_position_m"][1] == pytest.approx(0.323456789, abs=1e-6)
     assert shown(scene) == (10, 2, 2, 6)
 
@@ -344,7 +344,7 @@ def test_a_file_of_the_version_before_is_brought_up_to_date(scene: bpy.types.Sce
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"), load_ui=False)
     scene = bpy.context.scene
-    assert scene["rockfall_schema"] == 2
+    assert scene["rockfall_schema"] == 3
     found = everything(scene, part)
     for name in ("ids", "time_s", "position", "extra", "shift"):
         assert found[name] == before[name], name
@@ -390,7 +390,7 @@ def test_every_operator_refuses_a_newer_file_in_the_same_words(scene: bpy.types.
     assert operators == {name for name in dir(bpy.ops.rockfall) if not name.startswith("_")}
     assert operators >= LOOK_ONLY
     scene["rockfall_schema"] = 99
-    said = part("rockfall_addon.scene.migration").warning(scene)
+    said = part("rockfall_addon.scene.storage.migration").warning(scene)
     before = {o.name: repr(sorted(o.items())) for o in scene.objects}
     for name in sorted(operators - LOOK_ONLY):
         with pytest.raises(RuntimeError, match=re.escape(said)):
@@ -402,7 +402,7 @@ def test_every_operator_refuses_a_newer_file_in_the_same_words(scene: bpy.types.
 
 def test_a_shift_that_is_not_finite_changes_nothing(scene: bpy.types.Scene, part) -> None:
     before = everything(scene, part)
-    georeference = part("rockfall_addon.scene.georeference")
+    georeference = part("rockfall_addon.scene.terrain.georeference")
     with pytest.raises(part("core.errors").RockfallError, match="not finite"):
         georeference.write_shift(scene, part("core.georeference").GlobalShift(float("nan"), 0.0, 0.0))
     assert everything(scene, part) == before
@@ -418,8 +418,8 @@ def test_a_scene_without_anything_of_ours_stays_so(part) -> None:
 
 def on_the_parabolas(scene: bpy.types.Scene, part) -> bool:
     """Whether the blocks are on their flights at every frame."""
-    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
-    offsets = part("rockfall_addon.scene.timing").kept_offsets(scene)
+    result = part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(scene)
+    offsets = part("rockfall_addon.scene.footage.timing").kept_offsets(scene)
     states, flights = part("core.reconstruction.flight").flight_states, result.flights
     rate, worst = scene.render.fps / scene.render.fps_base, 0.0
     for block in objects(scene, "block"):
@@ -437,12 +437,12 @@ def on_the_parabolas(scene: bpy.types.Scene, part) -> bool:
 @pytest.mark.parametrize("first", ["sync", "recompute", "add_pick"])
 def test_another_frame_rate_before_blender_says_so(scene: bpy.types.Scene, part, first: str) -> None:
     """In a window what waits may be done after the rate has changed and before the handlers are called."""
-    before, sync = everything(scene, part), part("rockfall_addon.scene.sync")
+    before, sync = everything(scene, part), part("rockfall_addon.scene.footage.sync")
     assert on_the_parabolas(scene, part)
     scene.render.fps = 60
     if first == "add_pick":
         place = [30.0, 0.123456789, ground(30.0)]
-        part("rockfall_addon.scene.picks").add_pick(scene, "A", 13.9, place)
+        part("rockfall_addon.scene.picks.picks").add_pick(scene, "A", 13.9, place)
         sync.sync(scene, ["A"])
     else:
         getattr(sync, first)(scene)

@@ -23,7 +23,7 @@ def wave(path: Path) -> np.ndarray:
 def test_mesh_and_shift_give_the_survey_coordinates_back(part, tmp_path: Path) -> None:
     points = wave(tmp_path / "wave.asc")
     assert bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc")) == {"FINISHED"}
-    state, terrain = part("rockfall_addon.scene.georeference"), part("rockfall_addon.scene.terrain")
+    state, terrain = part("rockfall_addon.scene.terrain.georeference"), part("rockfall_addon.scene.terrain.terrain")
     ground = terrain.active_terrain(bpy.context.scene)
     coordinates = np.empty(3 * len(ground.data.vertices), dtype=np.float32)
     ground.data.vertices.foreach_get("co", coordinates)
@@ -37,7 +37,7 @@ def test_mesh_and_shift_give_the_survey_coordinates_back(part, tmp_path: Path) -
 def test_surface_of_a_mesh_is_the_mesh(part, tmp_path: Path) -> None:
     wave(tmp_path / "wave.asc")
     bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc"))
-    terrain = part("rockfall_addon.scene.terrain")
+    terrain = part("rockfall_addon.scene.terrain.terrain")
     ground = terrain.active_terrain(bpy.context.scene)
     imported = terrain.surface_of(ground)
     terrain._surfaces.clear()  # as when Blender starts
@@ -49,12 +49,12 @@ def test_surface_of_a_mesh_is_the_mesh(part, tmp_path: Path) -> None:
 
 def test_second_tile_uses_the_projects_shift(part, tmp_path: Path) -> None:
     wave(tmp_path / "wave.asc")
-    state = part("rockfall_addon.scene.georeference")
+    state = part("rockfall_addon.scene.terrain.georeference")
     shift = part("core.georeference").GlobalShift(2600010.0, 1199990.0, 400.0)
     state.write_shift(bpy.context.scene, shift)
     bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc"))
     assert state.read_shift(bpy.context.scene) == shift
-    ground = part("rockfall_addon.scene.terrain").active_terrain(bpy.context.scene)
+    ground = part("rockfall_addon.scene.terrain.terrain").active_terrain(bpy.context.scene)
     assert min(v.co.x for v in ground.data.vertices) == pytest.approx(-9.75, abs=1e-4)
 
 
@@ -99,8 +99,11 @@ def test_a_scan_in_millimetres_is_noticed_and_read_again(part, tmp_path: Path) -
     assert (step.actions[0], step.unit_m) == ("rockfall.import_terrain", 0.001)
     again = {"replaces": step.tile, "unit_m": step.unit_m}
     assert bpy.ops.rockfall.import_terrain(filepath=str(file), **again) == {"FINISHED"}
-    (tile,) = part("rockfall_addon.scene.terrain").tiles(scene)
-    middle = np.array(tile.bound_box).mean(axis=0) + part("rockfall_addon.scene.georeference").read_shift(scene).vector
+    (tile,) = part("rockfall_addon.scene.terrain.terrain").tiles(scene)
+    middle = (
+        np.array(tile.bound_box).mean(axis=0)
+        + part("rockfall_addon.scene.terrain.georeference").read_shift(scene).vector
+    )
     np.testing.assert_allclose(middle[:2], points.reshape(-1, 3).mean(axis=0)[:2], atol=0.01)
     assert np.abs(tile.bound_box).max() < 10_000, "near the origin of the scene"
     assert not following.next_step(scene).tile
@@ -127,7 +130,7 @@ def test_a_unit_is_chosen_by_its_name(part) -> None:
 def test_a_file_in_survey_feet_says_so_and_can_be_overruled(part) -> None:
     """The dialog reads it with the same function, and shows what that says."""
     file = Path(__file__).parents[1] / "data" / "field_cases" / "02-crs-in-feet" / "ftUS.tif"
-    terrain, scene = part("rockfall_addon.scene.terrain"), bpy.context.scene
+    terrain, scene = part("rockfall_addon.scene.terrain.terrain"), bpy.context.scene
     foot = 1200 / 3937
     for told, flat, height in (
         ({}, 1.0, 1.0),
@@ -137,7 +140,7 @@ def test_a_file_in_survey_feet_says_so_and_can_be_overruled(part) -> None:
     ):
         for tile in terrain.tiles(scene):
             terrain.remove(scene, [tile])
-        part("rockfall_addon.scene.georeference").forget_shift(scene)
+        part("rockfall_addon.scene.terrain.georeference").forget_shift(scene)
         assert bpy.ops.rockfall.import_terrain(filepath=str(file), **told) == {"FINISHED"}
         (tile,) = terrain.tiles(scene)
         extent = np.ptp(np.array(tile.bound_box), axis=0)
@@ -153,8 +156,8 @@ def test_survey_feet_far_from_the_origin_come_to_their_place(part, tmp_path: Pat
     corners = [(7_000_000, 2_000_000, 100), (7_000_400, 2_000_000, 100), (7_000_000, 2_000_400, 300)]
     file.write_text("\n".join([*("v {} {} {}".format(*c) for c in corners), "f 1 2 3"]) + "\n", encoding="utf-8")
     assert bpy.ops.rockfall.import_terrain(filepath=str(file), unit_m=float(foot)) == {"FINISHED"}
-    (tile,) = part("rockfall_addon.scene.terrain").tiles(bpy.context.scene)
-    shift = part("rockfall_addon.scene.georeference").read_shift(bpy.context.scene)
+    (tile,) = part("rockfall_addon.scene.terrain.terrain").tiles(bpy.context.scene)
+    shift = part("rockfall_addon.scene.terrain.georeference").read_shift(bpy.context.scene)
     found = np.array([vertex.co for vertex in tile.data.vertices]) + shift.vector
     known = np.array([[float(c * foot) for c in corner] for corner in corners])
     np.testing.assert_allclose(np.sort(found, axis=0), np.sort(known, axis=0), atol=0.002)
@@ -179,7 +182,7 @@ def test_the_dialog_and_what_was_read_say_what_the_file_says_of_its_numbers(part
     found = operators.ROCKFALL_OT_import_terrain._inspected(dialog)
     assert any(words in sentence for sentence in found.summary)
     assert bpy.ops.rockfall.import_terrain(filepath=str(FIELD_CASES / file)) == {"FINISHED"}
-    ((_, said),) = part("rockfall_addon.scene.terrain").readings(bpy.context.scene)
+    ((_, said),) = part("rockfall_addon.scene.terrain.terrain").readings(bpy.context.scene)
     assert any(words in sentence for sentence in said)
 
 
@@ -187,7 +190,10 @@ def test_faces_that_a_person_made_are_said_where_they_are_not_flat_or_cross_them
     """A concave one has its own area, as Blender cuts it."""
     wave(tmp_path / "wave.asc")
     bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "wave.asc"))
-    terrain, terrain_mesh = part("rockfall_addon.scene.terrain"), part("rockfall_addon.scene.terrain_mesh")
+    terrain, terrain_mesh = (
+        part("rockfall_addon.scene.terrain.terrain"),
+        part("rockfall_addon.scene.terrain.terrain_mesh"),
+    )
     ground = terrain.active_terrain(bpy.context.scene)
     assert not any("more than three corners" in said for said in terrain.remarks(bpy.context.scene))
     corners = [(0, 0, 0), (20, 0, 12), (20, 20, 12), (10, 20, 6), (10, 10, 6), (0, 10, 0)]

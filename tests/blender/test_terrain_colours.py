@@ -65,7 +65,7 @@ def test_a_coloured_scan_is_shown_in_its_colours(part, scan, tmp_path) -> None:
     light = 1.2 + 0.25 * (0.6 + 0.4 / 0.55 - 1.2)
     mixed = (ROCK + 0.25 * (linear(wanted / 255) - ROCK)) * light
     np.testing.assert_allclose(attribute(ground.data, "relief", "color")[:, :3], np.minimum(mixed, 1), atol=1e-5)
-    terrain = part("rockfall_addon.scene.terrain")
+    terrain = part("rockfall_addon.scene.terrain.terrain")
     before = terrain.surface_of(ground).colours
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
@@ -77,7 +77,7 @@ def test_a_coloured_scan_is_shown_in_its_colours(part, scan, tmp_path) -> None:
 def test_the_coarse_view_has_them_too(part, scan) -> None:
     ground, _, _ = scan
     bpy.context.scene.rockfall_terrain.view_limit = 2000
-    mesh = part("rockfall_addon.scene.terrain_mesh").stand_in(ground).data
+    mesh = part("rockfall_addon.scene.terrain.terrain_mesh").stand_in(ground).data
     assert len(mesh.polygons) < 1500
     shift = np.array(bpy.context.scene["rockfall_shift_m"])
     places = np.array([vertex.co for vertex in mesh.vertices]) + shift
@@ -161,7 +161,7 @@ def test_the_footage_colours_what_it_shows(part, demo) -> None:
 
 
 def test_a_camera_that_moves_makes_them_stale_and_they_can_be_removed(part, demo) -> None:
-    scene, colours = bpy.context.scene, part("rockfall_addon.scene.terrain_colours")
+    scene, colours = bpy.context.scene, part("rockfall_addon.scene.terrain.terrain_colours")
     assert bpy.ops.rockfall.colour_from_footage() == {"FINISHED"}
     assert colours.have(scene, "footage_colours")
     assert not colours.is_stale(scene)
@@ -182,7 +182,7 @@ def test_without_an_aligned_video_there_is_nothing_to_colour_from(part, scan) ->
 
 
 def test_a_page_of_the_scene_has_the_colours_of_the_footage(part, demo) -> None:
-    shown, ground = part("rockfall_addon.scene.shown"), part("core.film.composed.ground")
+    shown, ground = part("rockfall_addon.scene.picks.shown"), part("core.film.composed.ground")
     scene = bpy.context.scene
     assert bpy.ops.rockfall.propose_impacts() == {"FINISHED"}
     with_them = shown.show(shown.ask(scene, simulated=False, together=True), lambda *_: None)

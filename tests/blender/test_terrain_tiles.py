@@ -28,7 +28,7 @@ def halves(part, surface, axis=0):
 
 
 def add(part, surfaces):
-    shade, terrain = part("core.terrain.shading").shade, part("rockfall_addon.scene.terrain")
+    shade, terrain = part("core.terrain.shading").shade, part("rockfall_addon.scene.terrain.terrain")
     return [terrain.add_terrain(bpy.context.scene, surface, shade(surface)) for surface in surfaces]
 
 
@@ -37,7 +37,7 @@ def test_two_halves_reconstruct_as_the_whole(part, demo, tmp_path, reloaded: boo
     surface, result = demo
     scene = bpy.context.scene
     add(part, halves(part, surface))
-    terrain = part("rockfall_addon.scene.terrain")
+    terrain = part("rockfall_addon.scene.terrain.terrain")
     if reloaded:  # from single precision then
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
         bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"))
@@ -67,7 +67,7 @@ def test_a_tile_in_another_shift_comes_to_the_projects(part, demo) -> None:
     first, second = halves(part, surface)
     other = part("core.georeference").GlobalShift(surface.shift.x - 1000, surface.shift.y + 500, surface.shift.z)
     add(part, [first, part("core.terrain.joining").moved(second, other)])
-    state, terrain = part("rockfall_addon.scene.georeference"), part("rockfall_addon.scene.terrain")
+    state, terrain = part("rockfall_addon.scene.terrain.georeference"), part("rockfall_addon.scene.terrain.terrain")
     assert state.read_shift(bpy.context.scene) == surface.shift
     joined = terrain.surface_of_scene(bpy.context.scene)
     np.testing.assert_allclose(joined.bounds, surface.bounds, atol=1e-9)
@@ -78,7 +78,7 @@ def test_a_deleted_tile_is_gone_and_a_hidden_one_is_not(part, demo) -> None:
     surface, _ = demo
     scene = bpy.context.scene
     first, second = add(part, halves(part, surface))
-    terrain = part("rockfall_addon.scene.terrain")
+    terrain = part("rockfall_addon.scene.terrain.terrain")
     second.hide_set(True)
     second.hide_viewport = True
     assert len(terrain.surface_of_scene(scene).faces) == len(surface.faces)
@@ -93,7 +93,7 @@ def test_an_emptied_tile_is_left_out_in_words(part, demo) -> None:
     surface, _ = demo
     scene = bpy.context.scene
     first, second = add(part, halves(part, surface))
-    terrain = part("rockfall_addon.scene.terrain")
+    terrain = part("rockfall_addon.scene.terrain.terrain")
     second.data.clear_geometry()
     assert len(terrain.surface_of_scene(scene).faces) == len(first.data.polygons)
     assert [said for said in terrain.warnings(scene) if "second.ply has no faces" in said]
@@ -106,7 +106,7 @@ def test_a_moved_turned_and_mirrored_tile_is_where_it_is(part, demo) -> None:
     surface, _ = demo
     scene = bpy.context.scene
     (ground,) = add(part, [surface])
-    terrain = part("rockfall_addon.scene.terrain")
+    terrain = part("rockfall_addon.scene.terrain.terrain")
     ground.location, ground.scale = (10.0, 20.0, 30.0), (-1.0, 1.0, 2.0)
     bpy.context.view_layer.update()
     there = terrain.surface_of_scene(scene)
@@ -125,7 +125,7 @@ def test_a_locked_scan_that_a_script_has_moved_is_put_back(part, demo) -> None:
     surface, _ = demo
     scene = bpy.context.scene
     (ground,) = add(part, [surface])
-    terrain, following = part("rockfall_addon.scene.terrain"), part("rockfall_addon.scene.next_step")
+    terrain, following = part("rockfall_addon.scene.terrain.terrain"), part("rockfall_addon.scene.next_step")
     assert not bpy.ops.rockfall.put_terrain_back.poll()
     ground.location = (0.0, 0.0, 30.0)
     bpy.context.view_layer.update()
@@ -141,12 +141,12 @@ def test_undo_keeps_the_index_of_a_terrain_that_is_as_it_was(part, demo) -> None
     surface, _ = demo
     scene = bpy.context.scene
     (ground,) = add(part, [surface])
-    terrain = part("rockfall_addon.scene.terrain")
+    terrain = part("rockfall_addon.scene.terrain.terrain")
     before = terrain.surface_of_scene(scene)
-    part("rockfall_addon.scene.terrain_mesh").mistrust()
+    part("rockfall_addon.scene.terrain.terrain_mesh").mistrust()
     assert terrain.surface_of_scene(scene) is before
     ground.data.vertices[0].co.z += 1.0
-    part("rockfall_addon.scene.terrain_mesh").mistrust()
+    part("rockfall_addon.scene.terrain.terrain_mesh").mistrust()
     after = terrain.surface_of_scene(scene)
     assert after is not before
     assert after.vertices[0, 2] == pytest.approx(before.vertices[0, 2] + 1.0, abs=1e-4)
@@ -156,7 +156,7 @@ def test_far_terrain_is_said_to_be_coarse(part, demo) -> None:
     surface, _ = demo
     far = replace(surface, vertices=surface.vertices + np.array([50_000.0, 0, 0]))
     add(part, [far])
-    (said,) = part("rockfall_addon.scene.terrain").warnings(bpy.context.scene)
+    (said,) = part("rockfall_addon.scene.terrain.terrain").warnings(bpy.context.scene)
     assert "50 km" in said
     assert "3.9 mm" in said, "single precision beyond 32 768 m"
 
@@ -190,11 +190,11 @@ def planes(tmp_path):
 
 
 def grounds(part):
-    return part("rockfall_addon.scene.store").with_role(bpy.context.scene, "terrain")
+    return part("rockfall_addon.scene.storage.store").with_role(bpy.context.scene, "terrain")
 
 
 def picked(part):
-    found = part("rockfall_addon.scene.picks").picks_of(bpy.context.scene)
+    found = part("rockfall_addon.scene.picks.picks").picks_of(bpy.context.scene)
     return found.position.tolist(), found.time_s.tolist()
 
 

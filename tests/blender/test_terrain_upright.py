@@ -41,7 +41,7 @@ def test_a_shift_that_was_proposed_for_z_up_does_not_serve_y_up(part, tmp_path):
     told = {"shift_x": "2600000.0", "shift_y": "0.0", "shift_z": "-1200000.0"}
     told |= {"asked": True, "proposed": " ".join(told.values())}
     assert bpy.ops.rockfall.import_terrain(filepath=str(tmp_path / "upright.xyz"), up="y", **told) == {"FINISHED"}
-    shift = part("rockfall_addon.scene.georeference").read_shift(bpy.context.scene)
+    shift = part("rockfall_addon.scene.terrain.georeference").read_shift(bpy.context.scene)
     assert (shift.x, shift.y, shift.z) == (2_600_000, 1_200_000, 0)
 
 
@@ -51,7 +51,7 @@ def test_picks_that_came_with_it_are_turned_too(part, scene, files, picks):
     assert bpy.ops.rockfall.import_terrain(filepath=str(folder / "slope.obj"), up="y") == {"FINISHED"}
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "site.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(folder / "site.blend"))
-    part("rockfall_addon.scene.terrain")._surfaces.clear()
+    part("rockfall_addon.scene.terrain.terrain")._surfaces.clear()
     assert bpy.ops.rockfall.import_picks(filepath=str(folder / picks)) == {"FINISHED"}
-    found = part("rockfall_addon.scene.picks").picks_of(bpy.context.scene)
+    found = part("rockfall_addon.scene.picks.picks").picks_of(bpy.context.scene)
     np.testing.assert_allclose(found.shift.to_survey(found.position), right, atol=1e-5)

@@ -21,7 +21,11 @@ def slope(part):
     shift = part("core.georeference").GlobalShift(2_600_000.0, 1_200_000.0, 0.0)
     surface = part("core.terrain.surface").Surface(np.stack([x, y, z], -1).reshape(-1, 3), faces, shift, "slope.ply")
     shading = part("core.terrain.shading").shade(surface)
-    return part("rockfall_addon.scene.terrain").add_terrain(bpy.context.scene, surface, shading), surface, shading
+    return (
+        part("rockfall_addon.scene.terrain.terrain").add_terrain(bpy.context.scene, surface, shading),
+        surface,
+        shading,
+    )
 
 
 def colours(mesh) -> np.ndarray:
@@ -73,7 +77,7 @@ def test_each_slider_does_its_own(part, slope) -> None:
     np.testing.assert_allclose(colours(ground.data)[:, 0], np.minimum(flat[:, 0] / 0.55, 1.0), rtol=1e-5)
     np.testing.assert_allclose(list(values().values()), [0.0, 0.0, 0.0, 1.0, 2.0, 1.0, 1.0])
     assert bpy.ops.rockfall.reset_relief() == {"FINISHED"}
-    look = asdict(part("rockfall_addon.scene.terrain_look").look_of(bpy.context.scene))
+    look = asdict(part("rockfall_addon.scene.terrain.terrain_look").look_of(bpy.context.scene))
     assert look == {
         **dict(zip(RELIEF, (0.75, 0.75, 0.7, 1.0, 1.0), strict=True)),
         "scan_colours": 1.0,
@@ -103,7 +107,7 @@ def test_sliders_and_coarse_view_are_in_the_file(part, slope, tmp_path) -> None:
 def test_coarse_view_draws_a_third_of_the_limit_and_measures_on_all(part, slope) -> None:
     ground, surface, _ = slope
     scene = bpy.context.scene
-    view, terrain = part("rockfall_addon.scene.terrain_view"), part("rockfall_addon.scene.terrain")
+    view, terrain = part("rockfall_addon.scene.terrain.terrain_view"), part("rockfall_addon.scene.terrain.terrain")
     assert drawn(ground) == len(surface.faces) == 20_000
     scene.rockfall_terrain.view_limit = 12_000
     assert drawn(ground) == pytest.approx(4000, rel=0.3)
@@ -128,7 +132,7 @@ def test_a_tile_of_two_triangles_beside_a_large_one_is_drawn_as_it_is(part, slop
     bpy.context.scene.rockfall_terrain.view_limit = 1000
     corners = surface.vertices[[0, 1, 101, 102]]
     small = part("core.terrain.surface").Surface(corners, np.array([[0, 1, 3], [0, 3, 2]]), surface.shift, "corner.obj")
-    corner = part("rockfall_addon.scene.terrain").add_terrain(
+    corner = part("rockfall_addon.scene.terrain.terrain").add_terrain(
         bpy.context.scene, small, part("core.terrain.shading").shade(small)
     )
     assert drawn(corner) == 2
@@ -177,7 +181,7 @@ def test_a_coarse_mesh_that_somebody_deletes_shows_the_full_one(part, slope) -> 
     ground, surface, _ = slope
     scene = bpy.context.scene
     scene.rockfall_terrain.view_limit = 12_000
-    bpy.data.objects.remove(part("rockfall_addon.scene.terrain_mesh").stand_in(ground))
+    bpy.data.objects.remove(part("rockfall_addon.scene.terrain.terrain_mesh").stand_in(ground))
     bpy.context.view_layer.update()
     assert drawn(ground) == len(surface.faces)
     scene.rockfall_terrain.brightness = 0.9
@@ -188,13 +192,13 @@ def test_tiles_share_the_view(part, slope) -> None:
     scene = bpy.context.scene
     scene.rockfall_terrain.view_limit = 30_000
     assert drawn(ground) == 20_000
-    second = part("rockfall_addon.scene.terrain").add_terrain(scene, surface, shading)
+    second = part("rockfall_addon.scene.terrain.terrain").add_terrain(scene, surface, shading)
     assert drawn(ground) + drawn(second) == pytest.approx(10_000, rel=0.3)
     assert drawn(ground) == pytest.approx(drawn(second), rel=0.01)
 
 
 def test_a_material_of_an_older_file_gets_its_sliders(part) -> None:
     old = bpy.data.materials.new("Rockfall terrain")
-    materials = part("rockfall_addon.scene.materials")
+    materials = part("rockfall_addon.scene.storage.materials")
     assert materials.terrain_material() == old
     assert set(materials.TERRAIN_VALUES) <= set(old.node_tree.nodes.keys())

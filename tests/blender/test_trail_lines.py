@@ -10,7 +10,7 @@ def points_of(obj):
 
 
 def test_an_edit_reads_its_trajectory_alone_again(part):
-    lines, store = part("rockfall_addon.view.trail_lines"), part("rockfall_addon.scene.store")
+    lines, store = part("rockfall_addon.view.trail_lines"), part("rockfall_addon.scene.storage.store")
     assert bpy.ops.rockfall.load_demo() == {"FINISHED"}
     scene = bpy.context.scene
     before = lines.trails_of(scene)

@@ -33,7 +33,7 @@ def table(tmp_path: Path) -> Path:
 @pytest.fixture
 def scene(part, table: Path) -> bpy.types.Scene:
     scene = bpy.context.scene
-    part("rockfall_addon.scene.georeference").write_shift(scene, part("core.georeference").GlobalShift(*SHIFT))
+    part("rockfall_addon.scene.terrain.georeference").write_shift(scene, part("core.georeference").GlobalShift(*SHIFT))
     assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
     return scene
 
@@ -77,7 +77,7 @@ def test_picks_come_back_exactly_after_save_and_load(scene: bpy.types.Scene, par
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "site.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"), load_ui=False)
-    picks = part("rockfall_addon.scene.picks").picks_of(bpy.context.scene)
+    picks = part("rockfall_addon.scene.picks.picks").picks_of(bpy.context.scene)
     expected = part("core.exchange.tables").read_picks(table, part("core.georeference").GlobalShift(*SHIFT))
     for name in ("trajectory", "time_s", "position", "kind", "status", "normal"):
         np.testing.assert_array_equal(getattr(picks, name), getattr(expected, name), err_msg=name)
@@ -91,19 +91,19 @@ def test_a_moved_pick_moves_the_trajectory(scene: bpy.types.Scene, part) -> None
     pick.animation_data_clear()
     pick.location.x += 0.5
     assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
-    picks = part("rockfall_addon.scene.picks").picks_of(scene)
+    picks = part("rockfall_addon.scene.picks.picks").picks_of(scene)
     np.testing.assert_allclose(picks.position[1], PLACES[1] + [0.5, 0, 0], atol=1e-6)
     scene.frame_set(int(0.7312 * 24), subframe=(0.7312 * 24) % 1)
     np.testing.assert_allclose(scene.objects["A block"].matrix_world.translation, PLACES[1] + [0.5, 0, 0], atol=1e-3)
 
 
 def test_a_take_off_begins_the_next_flight_and_without_its_impact_it_is_said(scene: bpy.types.Scene, part) -> None:
-    picks, sync = part("rockfall_addon.scene.picks"), part("rockfall_addon.scene.sync")
+    picks, sync = part("rockfall_addon.scene.picks.picks"), part("rockfall_addon.scene.footage.sync")
     first = scene.objects["A impact 1"]
     place = list(first["rockfall_position_m"])
     off = picks.add_pick(scene, "A", first["rockfall_time_s"] + 0.08, [place[0] + 1, *place[1:]], kind="takeoff")
     sync.sync(scene, ["A"])
-    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
+    result = part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(scene)
     flies = result.flights.first_pick[~result.flights.is_contact & (result.flights.trajectory == "A")].tolist()
     assert flies[:2] == [0, 2]
     words = part("rockfall_addon.steps.impacts.panel")._slide(scene, first)
@@ -142,7 +142,7 @@ def test_imported_again_a_pick_is_what_the_table_says(scene: bpy.types.Scene, ta
 def test_a_deleted_pick_is_gone(scene: bpy.types.Scene, part, numbers) -> None:
     bpy.data.objects.remove(scene.objects["A impact 2"])
     assert bpy.ops.rockfall.reconstruct() == {"FINISHED"}
-    assert len(part("rockfall_addon.scene.picks").picks_of(scene)) == 7
+    assert len(part("rockfall_addon.scene.picks.picks").picks_of(scene)) == 7
     direct = (PLACES[3] - PLACES[1]) / (TIMES[3] - TIMES[1]) + [0, 0, GRAVITY * (TIMES[3] - TIMES[1]) / 2]
     pick = scene.objects["A impact 1"]
     np.testing.assert_allclose(numbers(pick)["restituted_mps"], direct, atol=1e-9)
@@ -167,7 +167,7 @@ def test_flight_curve_lies_on_the_parabola_and_ends_now(scene: bpy.types.Scene) 
 
 
 def test_of_many_flights_only_renders_have_tubes(part, scene: bpy.types.Scene, table: Path, monkeypatch) -> None:
-    monkeypatch.setattr(part("rockfall_addon.scene.trails"), "MANY_FLIGHTS", 2)
+    monkeypatch.setattr(part("rockfall_addon.scene.picks.trails"), "MANY_FLIGHTS", 2)
     bpy.data.objects.remove(scene.objects["A flights"])
     assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
     shown = {
@@ -190,7 +190,7 @@ def test_among_many_each_has_keys_of_its_own_that_are_copies(part, scene: bpy.ty
     for obj in list(scene.objects):
         bpy.data.objects.remove(obj)
     bpy.data.orphans_purge()
-    monkeypatch.setattr(part("rockfall_addon.scene.keyframes"), "MANY_ACTIONS", 1)
+    monkeypatch.setattr(part("rockfall_addon.scene.picks.keyframes"), "MANY_ACTIONS", 1)
     assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
     assert keys() == one_by_one
     actions = {obj.name: obj.animation_data.action for obj in scene.objects if obj.name in one_by_one}
@@ -200,7 +200,7 @@ def test_among_many_each_has_keys_of_its_own_that_are_copies(part, scene: bpy.ty
 
 
 def test_what_is_looked_up_is_what_is_there(part, scene: bpy.types.Scene) -> None:
-    store, picks = part("rockfall_addon.scene.store"), part("rockfall_addon.scene.picks")
+    store, picks = part("rockfall_addon.scene.storage.store"), part("rockfall_addon.scene.picks.picks")
     bpy.data.objects.remove(scene.objects["A flights"])
     with store.looking(scene):
         assert store.trajectories_of(scene, store.PICK_ROLE) == {"A", "B"}

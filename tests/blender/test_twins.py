@@ -26,7 +26,9 @@ def scene(part, tmp_path: Path) -> bpy.types.Scene:
     shift = part("core.georeference").GlobalShift()
     vertices = np.column_stack([x, y, -SLOPE * x])
     surface = part("core.terrain.surface").Surface(vertices, faces, shift, "plane", ())
-    part("rockfall_addon.scene.terrain").add_terrain(scene, surface, part("core.terrain.shading").shade(surface))
+    part("rockfall_addon.scene.terrain.terrain").add_terrain(
+        scene, surface, part("core.terrain.shading").shade(surface)
+    )
     rows = [
         f"{name},{time + later!r},{x!r},{aside!r},{-SLOPE * x!r},{kind},ok"
         for name, later, aside in (("A", 0.0, 0.0), ("B", 30.0, 3.0))
@@ -49,15 +51,15 @@ def of_role(scene: bpy.types.Scene, role: str) -> list[bpy.types.Object]:
 
 
 def expected(part, scene: bpy.types.Scene):
-    models = part("rockfall_addon.scene.models")
-    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
+    models = part("rockfall_addon.scene.models.models")
+    result = part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(scene)
     return models.find_predictions(scene, result, MODELS)
 
 
 def check_motion(part, scene: bpy.types.Scene) -> None:
     """Every flight of every twin is flown, by a block of its own that is hidden when it does not fly."""
     twins = expected(part, scene)
-    linger = part("rockfall_addon.scene.model_blocks").LINGER_S
+    linger = part("rockfall_addon.scene.models.model_blocks").LINGER_S
     rate = scene.render.fps / scene.render.fps_base
     begin = twins.time_s - np.where(twins.trajectory == "A", TIMES[0], TIMES[0] + 30.0 - scene.rockfall.stagger_s)
     end = begin + twins.duration_s
@@ -175,9 +177,9 @@ def test_parameters_of_a_file_are_used_and_kept(scene: bpy.types.Scene, part, tm
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "site.blend"), load_ui=False)
     scene = bpy.context.scene
-    models = part("rockfall_addon.scene.models")
+    models = part("rockfall_addon.scene.models.models")
     assert models.parameters_of(scene) == own
-    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
+    result = part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(scene)
     twins = models.find_predictions(scene, result, models.shown_models(scene))
     impacts = result.impacts
     normal = np.sum(impacts.v1 * impacts.normal, axis=1)[:, None] * impacts.normal

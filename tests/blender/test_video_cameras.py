@@ -10,7 +10,7 @@ from video_scene import DATA, Part, add, scene, solved
 
 
 def test_a_camera_that_stands_has_no_keys_of_one_that_moved(part: Part) -> None:
-    camera_paths, camera = part("rockfall_addon.scene.camera_paths"), add(part, "variable.mp4")
+    camera_paths, camera = part("rockfall_addon.scene.footage.camera_paths"), add(part, "variable.mp4")
     camera_paths.set_camera_path(scene(), camera, solved(part, camera, 20))
     action = camera.animation_data.action
     assert len(bpy.data.actions) == 1
@@ -25,7 +25,7 @@ def test_a_camera_that_stands_has_no_keys_of_one_that_moved(part: Part) -> None:
 
 def test_a_camera_that_is_no_longer_solved_stays_where_it_was_shown(part: Part) -> None:
     """Free to be moved: keys of a camera that moved would take it back at the next picture."""
-    camera_paths, camera = part("rockfall_addon.scene.camera_paths"), add(part, "variable.mp4")
+    camera_paths, camera = part("rockfall_addon.scene.footage.camera_paths"), add(part, "variable.mp4")
     camera_paths.set_camera_path(scene(), camera, solved(part, camera, 20))
     scene().frame_set(scene().frame_start + 3)
     shown = np.array(camera.matrix_world)
@@ -42,7 +42,10 @@ def test_pixels_that_are_not_square(part: Part) -> None:
     """Of the same angle of view across and up: fx · width of a pixel = fy · height of a pixel."""
     from dataclasses import replace
 
-    new_videos, camera_paths = part("rockfall_addon.scene.new_videos"), part("rockfall_addon.scene.camera_paths")
+    new_videos, camera_paths = (
+        part("rockfall_addon.scene.footage.new_videos"),
+        part("rockfall_addon.scene.footage.camera_paths"),
+    )
     video = replace(part("core.footage.video").open_video(DATA / "constant.mp4"), pixel_aspect=1.25)
     camera = new_videos.add_camera(scene(), video)
     one = camera_paths.camera_path(camera).reference
@@ -76,9 +79,9 @@ def test_render_size_follows_the_active_camera(part: Part) -> None:
 @pytest.mark.parametrize("frames", [1, 20])
 def test_solved_camera(part: Part, frames: int, tmp_path: Path) -> None:
     """Its doubles come back exactly, also from a file, and Blender's camera sees what ours does."""
-    camera_paths = part("rockfall_addon.scene.camera_paths")
-    videos = part("rockfall_addon.scene.videos")
-    clocks = part("rockfall_addon.scene.clocks")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
+    videos = part("rockfall_addon.scene.footage.videos")
+    clocks = part("rockfall_addon.scene.footage.clocks")
     model = part("core.camera.model")
     camera = add(part, "variable.mp4")
     moving = solved(part, camera, frames)
@@ -120,12 +123,12 @@ def test_solved_camera(part: Part, frames: int, tmp_path: Path) -> None:
 def test_solved_camera_of_another_size(part: Part) -> None:
     camera = add(part, "rotated.mov")
     with pytest.raises(part("core.errors").RockfallError, match="64 × 48"):
-        part("rockfall_addon.scene.camera_paths").set_camera_path(scene(), camera, solved(part, camera, 1))
+        part("rockfall_addon.scene.footage.camera_paths").set_camera_path(scene(), camera, solved(part, camera, 1))
 
 
 def test_pixels_and_rays(part: Part) -> None:
-    clocks = part("rockfall_addon.scene.clocks")
-    camera_paths = part("rockfall_addon.scene.camera_paths")
+    clocks = part("rockfall_addon.scene.footage.clocks")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
     view = part("rockfall_addon.view.image_view")
     camera = add(part, "variable.mp4")
     clocks.set_clock(camera, part("core.footage.clock").Clock(5.0, 1e-3, 0.1, 0.25))
@@ -141,9 +144,9 @@ def test_pixels_and_rays(part: Part) -> None:
 
 
 def test_copied_camera_is_a_camera_of_its_own(part: Part) -> None:
-    video_files = part("rockfall_addon.scene.video_files")
-    clocks = part("rockfall_addon.scene.clocks")
-    videos = part("rockfall_addon.scene.videos")
+    video_files = part("rockfall_addon.scene.footage.video_files")
+    clocks = part("rockfall_addon.scene.footage.clocks")
+    videos = part("rockfall_addon.scene.footage.videos")
     camera = add(part, "constant.mp4")
     copy = camera.copy()  # linked data, as Alt D makes it
     camera.users_collection[0].objects.link(copy)
@@ -160,7 +163,7 @@ def test_copied_camera_is_a_camera_of_its_own(part: Part) -> None:
 
 
 def test_camera_deleted(part: Part) -> None:
-    videos = part("rockfall_addon.scene.videos")
+    videos = part("rockfall_addon.scene.footage.videos")
     camera, other = add(part, "constant.mp4"), add(part, "variable.mp4")
     identifier = camera["rockfall_id"]
     bpy.data.objects.remove(camera)

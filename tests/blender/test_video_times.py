@@ -8,18 +8,18 @@ from video_scene import DATA, Part, add, scene
 
 
 def test_television_rate_is_exact(part: Part) -> None:
-    new_videos = part("rockfall_addon.scene.new_videos")
+    new_videos = part("rockfall_addon.scene.footage.new_videos")
     new_videos.add_video(scene(), DATA / "rotated.mov")
     assert scene().render.fps / scene().render.fps_base == 30_000 / 1001
 
 
 @pytest.mark.parametrize(("rate", "fps", "base"), [(30, 30, 1), (29.97002997, 30_000, 1001), (59.94006, 30_000, 500.5)])
 def test_scene_rate(part: Part, rate: float, fps: int, base: float) -> None:
-    assert part("rockfall_addon.scene.clocks").scene_rate(rate) == (fps, base)
+    assert part("rockfall_addon.scene.footage.clocks").scene_rate(rate) == (fps, base)
 
 
 def test_odd_rate(part: Part) -> None:
-    fps, base = part("rockfall_addon.scene.clocks").scene_rate(29.83)
+    fps, base = part("rockfall_addon.scene.footage.clocks").scene_rate(29.83)
     assert fps == 30
     assert fps / base == pytest.approx(29.83)
 
@@ -33,9 +33,9 @@ def pair(part: Part) -> tuple[bpy.types.Object, bpy.types.Object]:
 @pytest.mark.parametrize("fit_drift", [False, True])
 def test_events_synchronise(part: Part, fit_drift: bool) -> None:
     """Events at pictures whose times are known lead back to the clock that was made up for the second video."""
-    videos = part("rockfall_addon.scene.videos")
-    clocks = part("rockfall_addon.scene.clocks")
-    times = part("rockfall_addon.scene.video_times")
+    videos = part("rockfall_addon.scene.footage.videos")
+    clocks = part("rockfall_addon.scene.footage.clocks")
+    times = part("rockfall_addon.scene.footage.video_times")
     reference, other = (add(part, "slower.mp4") for _ in range(2))
     assert times.reference_camera(scene()) == reference
     assert times.never_synchronised(scene()) == other
@@ -64,7 +64,7 @@ def test_events_synchronise(part: Part, fit_drift: bool) -> None:
 
 
 def test_next_video_begins_with_the_others(part: Part) -> None:
-    clocks, videos = part("rockfall_addon.scene.clocks"), part("rockfall_addon.scene.videos")
+    clocks, videos = part("rockfall_addon.scene.footage.clocks"), part("rockfall_addon.scene.footage.videos")
     camera = add(part, "constant.mp4")
     clocks.set_clock(camera, part("core.footage.clock").Clock(465.5))
     other = add(part, "variable.mp4")
@@ -72,18 +72,18 @@ def test_next_video_begins_with_the_others(part: Part) -> None:
 
 
 def test_nothing_to_synchronise(part: Part, pair: tuple[bpy.types.Object, ...]) -> None:
-    times, errors = part("rockfall_addon.scene.video_times"), part("core.errors")
+    times, errors = part("rockfall_addon.scene.footage.video_times"), part("core.errors")
     with pytest.raises(errors.RockfallError, match="same event"):
         times.synchronise_cameras(scene(), fit_drift=False)
-    part("rockfall_addon.scene.footage").remove(scene(), pair[1])
+    part("rockfall_addon.scene.footage.footage").remove(scene(), pair[1])
     with pytest.raises(errors.RockfallError, match="one video only"):
         times.synchronise_cameras(scene(), fit_drift=False)
 
 
 def test_stepping_lands_on_true_frames(part: Part) -> None:
-    videos = part("rockfall_addon.scene.videos")
-    clocks = part("rockfall_addon.scene.clocks")
-    times = part("rockfall_addon.scene.video_times")
+    videos = part("rockfall_addon.scene.footage.videos")
+    clocks = part("rockfall_addon.scene.footage.clocks")
+    times = part("rockfall_addon.scene.footage.video_times")
     camera = add(part, "variable.mp4")
     scene().render.fps = 24
     stamps = videos.times_of(camera)
@@ -108,7 +108,7 @@ def test_stepping_lands_on_true_frames(part: Part) -> None:
 
 
 def test_time_origin(part: Part, pair: tuple[bpy.types.Object, ...]) -> None:
-    clocks = part("rockfall_addon.scene.clocks")
+    clocks = part("rockfall_addon.scene.footage.clocks")
     camera, other = pair
     scene().camera = camera
     scene().frame_set(12)
@@ -128,7 +128,7 @@ def test_common_clock_stays_with_picks(part: Part, pair: tuple[bpy.types.Object,
 
 
 def test_scene_rate_changed(part: Part) -> None:
-    clocks, words = part("rockfall_addon.scene.clocks"), part("rockfall_addon.steps.videos.wording")
+    clocks, words = part("rockfall_addon.scene.footage.clocks"), part("rockfall_addon.steps.videos.wording")
     camera = add(part, "constant.mp4")
     assert words.rates(scene(), camera) == ""
     scene().render.fps = 24
@@ -141,7 +141,7 @@ def test_scene_rate_changed(part: Part) -> None:
 
 def test_slow_motion(part: Part) -> None:
     """240 pictures a second stored at 30: the fall takes an eighth of the file's duration."""
-    clocks = part("rockfall_addon.scene.clocks")
+    clocks = part("rockfall_addon.scene.footage.clocks")
     camera = add(part, "constant.mp4")
     camera.rockfall_video.capture_rate_hz = 240
     assert clocks.clock_of(camera).to_common(0.8) == pytest.approx(0.1)

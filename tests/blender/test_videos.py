@@ -14,10 +14,10 @@ from video_scene import DATA, Part, add, number_in, scene
 
 @pytest.mark.parametrize("name", ["constant.mp4", "rotated.mov", "variable.mp4"])
 def test_added_video(part: Part, name: str) -> None:
-    new_videos = part("rockfall_addon.scene.new_videos")
-    video_files = part("rockfall_addon.scene.video_files")
-    videos = part("rockfall_addon.scene.videos")
-    clocks = part("rockfall_addon.scene.clocks")
+    new_videos = part("rockfall_addon.scene.footage.new_videos")
+    video_files = part("rockfall_addon.scene.footage.video_files")
+    videos = part("rockfall_addon.scene.footage.videos")
+    clocks = part("rockfall_addon.scene.footage.clocks")
     camera = new_videos.add_video(scene(), DATA / name)
     video = video_files.video_of(camera)
     assert videos.size_of(camera) == (video.width, video.height) == tuple(video_files.clip_of(camera).size)
@@ -31,7 +31,7 @@ def test_added_video(part: Part, name: str) -> None:
 @pytest.fixture
 def seen(part: Part, tmp_path: Path) -> Callable[[bpy.types.Object, int], int]:
     """The number in the picture that Blender has behind a camera at a frame: rendered by the compositor."""
-    videos = part("rockfall_addon.scene.videos")
+    videos = part("rockfall_addon.scene.footage.videos")
     tree = bpy.data.node_groups.new("seen", "CompositorNodeTree")
     tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
     result = tree.nodes.new("NodeGroupOutput")
@@ -76,9 +76,9 @@ def test_picture_behind_the_camera(
     part: Part, seen: Callable[[bpy.types.Object, float], int], name: str, capture_rate_hz: float | None
 ) -> None:
     """Whatever the rates, Blender shows the last picture that is not later than the scene's time."""
-    new_videos = part("rockfall_addon.scene.new_videos")
-    clocks = part("rockfall_addon.scene.clocks")
-    videos = part("rockfall_addon.scene.videos")
+    new_videos = part("rockfall_addon.scene.footage.new_videos")
+    clocks = part("rockfall_addon.scene.footage.clocks")
+    videos = part("rockfall_addon.scene.footage.videos")
     clock = part("core.footage.clock")
     camera = new_videos.add_video(scene(), DATA / name)
     scene().camera = camera
@@ -103,7 +103,7 @@ def test_picture_behind_the_camera(
     "name", ["constant.mp4", "variable.mp4", "variable.mkv", "slower.mp4", "vp9.webm", "bframes.avi"]
 )
 def test_every_picture_can_be_seen(part: Part, seen: Callable[[bpy.types.Object, float], int], name: str) -> None:
-    new_videos, clocks = part("rockfall_addon.scene.new_videos"), part("rockfall_addon.scene.clocks")
+    new_videos, clocks = part("rockfall_addon.scene.footage.new_videos"), part("rockfall_addon.scene.footage.clocks")
     camera = new_videos.add_video(scene(), DATA / name)
     scene().camera = camera
     for index in range(0, 40, 1):
@@ -112,14 +112,14 @@ def test_every_picture_can_be_seen(part: Part, seen: Callable[[bpy.types.Object,
 
 @pytest.mark.parametrize("name", ["constant.mp4", "rotated.mov", "vp9.webm"])
 def test_no_picture_of_a_healthy_video_is_said_to_be_hidden(part: Part, name: str) -> None:
-    assert part("rockfall_addon.scene.footage").hidden(add(part, name)) == 0
+    assert part("rockfall_addon.scene.footage.footage").hidden(add(part, name)) == 0
 
 
 def test_file_moved(part: Part, tmp_path: Path) -> None:
-    new_videos = part("rockfall_addon.scene.new_videos")
-    videos = part("rockfall_addon.scene.videos")
-    video_files = part("rockfall_addon.scene.video_files")
-    clocks = part("rockfall_addon.scene.clocks")
+    new_videos = part("rockfall_addon.scene.footage.new_videos")
+    videos = part("rockfall_addon.scene.footage.videos")
+    video_files = part("rockfall_addon.scene.footage.video_files")
+    clocks = part("rockfall_addon.scene.footage.clocks")
     words = part("rockfall_addon.steps.videos.wording")
     errors = part("core.errors")
     there = tmp_path / "there.mp4"
@@ -140,18 +140,18 @@ def test_file_moved(part: Part, tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="another one"):
         bpy.ops.rockfall.relink_video(filepath=str(DATA / "rotated.mov"))
     assert words.is_missing(camera)
-    assert "frames" in part("rockfall_addon.scene.footage").relink(camera, DATA / "variable.mp4")[0]
+    assert "frames" in part("rockfall_addon.scene.footage.footage").relink(camera, DATA / "variable.mp4")[0]
     assert bpy.ops.rockfall.relink_video(filepath=str(tmp_path / "elsewhere.mp4")) == {"FINISHED"}
     assert not words.is_missing(camera)
-    assert part("rockfall_addon.scene.video_times").events_of(camera) == {1: 0.4}
+    assert part("rockfall_addon.scene.footage.video_times").events_of(camera) == {1: 0.4}
     assert number_in(video_files.picture(camera, 12)) == 12
     assert len(bpy.data.movieclips) == 1
 
 
 def test_a_file_that_is_moved_with_its_video_takes_that_one(part: Part, tmp_path: Path) -> None:
     """The copy of a site reads its own video, though the old one is still there; in all that reads it."""
-    new_videos, videos = part("rockfall_addon.scene.new_videos"), part("rockfall_addon.scene.videos")
-    video_files = part("rockfall_addon.scene.video_files")
+    new_videos, videos = part("rockfall_addon.scene.footage.new_videos"), part("rockfall_addon.scene.footage.videos")
+    video_files = part("rockfall_addon.scene.footage.video_files")
     site, copy = tmp_path / "site", tmp_path / "copy ü"
     site.mkdir()
     (site / "video.mp4").write_bytes((DATA / "constant.mp4").read_bytes())
@@ -163,7 +163,7 @@ def test_a_file_that_is_moved_with_its_video_takes_that_one(part: Part, tmp_path
     bpy.ops.wm.open_mainfile(filepath=str(copy / "site.blend"))
     (camera,) = videos.cameras(scene())
     assert Path(camera["rockfall_video_file"]).parent == site, "what was stored is the other one"
-    inputs = part("rockfall_addon.scene.design_sheet")._inputs(scene())
+    inputs = part("rockfall_addon.scene.simulation.design_sheet")._inputs(scene())
     paths = {video_files.file_of(camera), video_files.video_of(camera).path, inputs[f"video {camera.name}"]}
     assert paths == {(copy / "video.mp4").resolve()}
     (copy / "video.mp4").unlink()
@@ -173,7 +173,7 @@ def test_a_file_that_is_moved_with_its_video_takes_that_one(part: Part, tmp_path
 
 
 def test_a_clip_of_another_size_is_refused(part: Part, tmp_path: Path) -> None:
-    video_files = part("rockfall_addon.scene.video_files")
+    video_files = part("rockfall_addon.scene.footage.video_files")
     camera = add(part, "constant.mp4")
     video_files.clip_of(camera).filepath = str(DATA / "rotated.mov")
     with pytest.raises(part("core.errors").RockfallError, match=r"what was marked is of .* px\. Use Find the File"):
@@ -197,7 +197,7 @@ def test_bad_videos(part: Part, name: str, said: str) -> None:
 def test_good_among_bad(part: Part) -> None:
     names = [{"name": name} for name in ("interlaced.mp4", "constant.mp4", "rotated.mov")]
     assert bpy.ops.rockfall.add_video(directory=str(DATA), files=names) == {"FINISHED"}
-    cameras = part("rockfall_addon.scene.videos").cameras(scene())
+    cameras = part("rockfall_addon.scene.footage.videos").cameras(scene())
     assert [camera.name for camera in cameras] == ["constant", "rotated"]
     assert scene().camera == cameras[0]
 
@@ -227,8 +227,8 @@ def test_disabled_and_enabled(part: Part, installation: object) -> None:
     add(part, "constant.mp4")
     installation.disable()
     installation.enable()
-    videos = installation.part("rockfall_addon.scene.videos")
-    clocks = installation.part("rockfall_addon.scene.clocks")
+    videos = installation.part("rockfall_addon.scene.footage.videos")
+    clocks = installation.part("rockfall_addon.scene.footage.clocks")
     (camera,) = videos.cameras(scene())
     scene().frame_set(20)
     assert clocks.true_frame(scene(), camera) == 20
@@ -238,7 +238,7 @@ def test_a_video_that_was_held_by_hand_is_asked_about_before_anything_is_marked(
     """The demo's footage pans; it is asked until the camera is said to be hand-held."""
     footage = Path(__file__).resolve().parents[2] / "assets" / "demo" / "footage" / "footage.mp4"
     assert bpy.ops.rockfall.add_video(filepath=str(footage)) == {"FINISHED"}
-    following, videos = part("rockfall_addon.scene.next_step"), part("rockfall_addon.scene.videos")
+    following, videos = part("rockfall_addon.scene.next_step"), part("rockfall_addon.scene.footage.videos")
     camera = videos.active_camera(scene())
     step = following.next_step(scene())
     assert "if it was held by hand, choose Hand-held in step 3" in step.sentence
@@ -257,8 +257,8 @@ def test_a_tripod_is_not_asked_about(scan, part: Part, tmp_path: Path) -> None:
     writer.release()
     assert bpy.ops.rockfall.add_video(filepath=str(tmp_path / "still.mp4")) == {"FINISHED"}
     assert "held by hand" not in part("rockfall_addon.scene.next_step").next_step(scene()).sentence
-    (camera,) = part("rockfall_addon.scene.videos").cameras(scene())
-    alignment = part("rockfall_addon.scene.alignment")
+    (camera,) = part("rockfall_addon.scene.footage.videos").cameras(scene())
+    alignment = part("rockfall_addon.scene.footage.alignment")
     assert not alignment.background_remarks(camera)
     assert not alignment.is_taken_for_a_tripod(camera), "somebody has looked, and it stood still"
 
@@ -268,7 +268,7 @@ def test_a_camera_that_moves_is_to_be_followed_before_anything_is_picked(part: P
     demo = Path(__file__).resolve().parents[2] / "assets" / "demo"
     assert bpy.ops.rockfall.import_terrain(filepath=str(demo / "terrain.ply")) == {"FINISHED"}
     assert bpy.ops.rockfall.add_video(filepath=str(demo / "footage" / "footage.mp4")) == {"FINISHED"}
-    following, videos = part("rockfall_addon.scene.next_step"), part("rockfall_addon.scene.videos")
+    following, videos = part("rockfall_addon.scene.next_step"), part("rockfall_addon.scene.footage.videos")
     camera = videos.active_camera(scene())
     camera.rockfall_alignment.motion = "ROTATION"
     assert "follow" not in following.next_step(scene()).sentence, "first it is solved"
@@ -276,5 +276,5 @@ def test_a_camera_that_moves_is_to_be_followed_before_anything_is_picked(part: P
     step = following.next_step(scene())
     assert "follow its background" in step.sentence
     assert step.actions == ("rockfall.follow_background",)
-    camera[part("rockfall_addon.scene.store").FOLLOWED] = "{}"
+    camera[part("rockfall_addon.scene.storage.store").FOLLOWED] = "{}"
     assert "follow" not in following.next_step(scene()).sentence, "also where it was found to stand still"

@@ -154,7 +154,7 @@ def test_the_file_of_the_workspace(rockfall, part, tmp_path: Path) -> None:
         assert not there.scenes
         here.workspaces = there.workspaces
     (ours,) = here.workspaces
-    assert part("rockfall_addon.scene.store").WORKSPACE in ours
+    assert part("rockfall_addon.scene.storage.store").WORKSPACE in ours
     (screen,) = ours.screens
     views = sorted((area for area in screen.areas if area.type == "VIEW_3D"), key=lambda area: area.x)
     assert len(views) == 2
@@ -194,14 +194,14 @@ def test_opening_needs_a_window(rockfall) -> None:
 def test_footage_demo_is_ready_to_be_picked(rockfall, part) -> None:
     assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
     scene = bpy.context.scene
-    videos = part("rockfall_addon.scene.videos")
-    camera_paths = part("rockfall_addon.scene.camera_paths")
-    clocks = part("rockfall_addon.scene.clocks")
+    videos = part("rockfall_addon.scene.footage.videos")
+    camera_paths = part("rockfall_addon.scene.footage.camera_paths")
+    clocks = part("rockfall_addon.scene.footage.clocks")
     (camera,) = videos.cameras(scene)
     assert camera_paths.is_solved(camera)
     assert scene.camera == camera
     assert clocks.video_time(scene, camera) == pytest.approx(51 / 30, abs=1e-6)
-    sightings = part("rockfall_addon.scene.sightings")
+    sightings = part("rockfall_addon.scene.footage.sightings")
     assert sightings.names_in(camera) == ["B10"]
-    assert part("rockfall_addon.scene.places").trajectory(scene) == "B10"
+    assert part("rockfall_addon.scene.picks.places").trajectory(scene) == "B10"
     assert not bpy.ops.rockfall.load_footage_demo.poll()

@@ -50,7 +50,7 @@ def scene(part, table: Path) -> bpy.types.Scene:
 def slope(part, table: Path, terrain_file: Path) -> bpy.types.Scene:
     """The scene with its terrain."""
     surface = part("core.terrain.readers").read_terrain(terrain_file)
-    part("rockfall_addon.scene.terrain").add_terrain(
+    part("rockfall_addon.scene.terrain.terrain").add_terrain(
         bpy.context.scene, surface, part("core.terrain.shading").shade(surface)
     )
     assert bpy.ops.rockfall.import_picks(filepath=str(table)) == {"FINISHED"}
@@ -101,9 +101,9 @@ def move_key(obj: bpy.types.Object, frames: float) -> None:
 
 def check_shown(scene: bpy.types.Scene, part) -> None:
     """What is shown is what a reconstruction of the picks from nothing gives."""
-    result = part("rockfall_addon.scene.reconstruction").reconstruct_scene(scene)
+    result = part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(scene)
     rows = {(row.trajectory, row.number): row for row in scene.rockfall_impacts}
-    numbers = part("rockfall_addon.scene.impact_numbers").of
+    numbers = part("rockfall_addon.scene.picks.impact_numbers").of
     assert len(rows) == len(result.impacts)
     for i in range(len(result.impacts)):
         row = rows[str(result.impacts.trajectory[i]), int(result.impacts.impact[i])]

@@ -32,7 +32,7 @@ def number_in(image: np.ndarray) -> int:
 
 
 def add(part: Part, name: str) -> bpy.types.Object:
-    return part("rockfall_addon.scene.new_videos").add_video(scene(), DATA / name)
+    return part("rockfall_addon.scene.footage.new_videos").add_video(scene(), DATA / name)
 
 
 def solved(part: Part, camera: bpy.types.Object, frames: int) -> object:
@@ -42,7 +42,7 @@ def solved(part: Part, camera: bpy.types.Object, frames: int) -> object:
     one = model.with_intrinsics(one, [80.1, 79.7, 31.2, 24.9, 0.01, -0.002, 0.0, 1e-4, 2e-4])
     if frames == 1:
         return paths.fixed(one)
-    time = part("rockfall_addon.scene.videos").times_of(camera)[:frames]
+    time = part("rockfall_addon.scene.footage.videos").times_of(camera)[:frames]
     turn = model.rotation_from_vector(np.outer(np.sin(5 * time), [0.02, -0.03, 0.01])) @ one.rotation
     place = one.position + np.outer(time, [0.1, 0.0, 0.05])
     return paths.CameraPath(one, time, place, turn, 0.01 * np.ones(frames), 1e-4 * np.ones(frames))

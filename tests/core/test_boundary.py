@@ -327,7 +327,7 @@ def stored_names_in(paths: list[Path], known: set[str]) -> list[str]:
 
 
 def test_stored_names_stand_in_one_place() -> None:
-    store = ROOT / "rockfall_addon" / "scene" / "store.py"
+    store = ROOT / "rockfall_addon" / "scene" / "storage" / "store.py"
     paths = list(modules_of("rockfall_addon"))
     known = registered_properties(paths)
     assert stored_names_in([path for path in paths if path != store], known) == []

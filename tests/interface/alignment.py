@@ -19,10 +19,10 @@ def start(window):
     scene = bpy.context.scene
     opening, project = window.part("core.workflow.opening"), window.part("core.exchange.project")
     surface, result = opening.open_project(project.read_project(DEMO / "project.toml"))
-    window.part("rockfall_addon.scene.georeference").write_shift(scene, result.picks.shift)
+    window.part("rockfall_addon.scene.terrain.georeference").write_shift(scene, result.picks.shift)
     shading = window.part("core.terrain.shading").shade(surface)
-    window.part("rockfall_addon.scene.terrain").add_terrain(scene, surface, shading)
-    camera = window.part("rockfall_addon.scene.new_videos").add_video(scene, FOOTAGE / "footage.mp4")
+    window.part("rockfall_addon.scene.terrain.terrain").add_terrain(scene, surface, shading)
+    camera = window.part("rockfall_addon.scene.footage.new_videos").add_video(scene, FOOTAGE / "footage.mp4")
     yield 1.0
     with window.override():
         assert bpy.ops.rockfall.align_views() == {"FINISHED"}
@@ -43,12 +43,12 @@ def region_of(area):
 
 
 def table(window):
-    shift = window.part("rockfall_addon.scene.georeference").read_shift(bpy.context.scene)
+    shift = window.part("rockfall_addon.scene.terrain.georeference").read_shift(bpy.context.scene)
     return window.part("core.exchange.cameras").read_pairs(FOOTAGE / "pairs.csv", shift)
 
 
 def the_camera(window):
-    return window.part("rockfall_addon.scene.videos").active_camera(bpy.context.scene)
+    return window.part("rockfall_addon.scene.footage.videos").active_camera(bpy.context.scene)
 
 
 def in_picture(window, pixel):
@@ -95,7 +95,8 @@ def sidebar(window, shown):
 def case_align_with_clicks(window):
     yield from start(window)
     aligned, pairs, camera_paths = (
-        window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "pairs", "camera_paths")
+        window.part(f"rockfall_addon.scene.{name}")
+        for name in ("footage.alignment", "footage.pairs", "footage.camera_paths")
     )
     ground = table(window)
     look_at(window, ground.point)
@@ -184,7 +185,7 @@ def case_align_with_clicks(window):
 def case_align_by_eye(window):
     """Footage that cannot be solved: the view is taken; then terrain that shines through is dragged into place."""
     yield from start(window)
-    aligned, pairs = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "pairs"))
+    aligned, pairs = (window.part(f"rockfall_addon.scene.{name}") for name in ("footage.alignment", "footage.pairs"))
     ground = table(window)
     yield from sidebar(window, False)
     window.window.cursor_warp(800, 500)
@@ -209,7 +210,7 @@ def case_align_by_eye(window):
     pair = pairs.open_pair(the_camera(window))
     assert pair.proposed == "pixel"
     assert np.allclose(pair.pixel, (640, 360), atol=2), "what shines through there"
-    surface = window.part("rockfall_addon.scene.terrain").surface_of_scene(bpy.context.scene)
+    surface = window.part("rockfall_addon.scene.terrain.terrain").surface_of_scene(bpy.context.scene)
     assert window.part("core.terrain.raycast").closest_points(surface, [pair.point]).distance[0] < 1e-6
     window.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=round(x), y=round(y))
     window.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=round(x), y=round(y))
@@ -252,7 +253,7 @@ def seen_state(window):
 def case_align_escape(window):
     """Esc while a mark is held takes it back, and the camera that was solved with it."""
     yield from start(window)
-    camera_paths, ground = window.part("rockfall_addon.scene.camera_paths"), table(window)
+    camera_paths, ground = window.part("rockfall_addon.scene.footage.camera_paths"), table(window)
     look_at(window, ground.point)
     yield from sidebar(window, False)
     for i in (1, 4, 7, 11):
@@ -284,7 +285,9 @@ def case_align_escape(window):
 
 def case_align_follow_hand_held(window):
     yield from start(window)
-    aligned, camera_paths = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "camera_paths"))
+    aligned, camera_paths = (
+        window.part(f"rockfall_addon.scene.{name}") for name in ("footage.alignment", "footage.camera_paths")
+    )
     with window.override():
         assert bpy.ops.rockfall.import_pairs(filepath=str(FOOTAGE / "pairs.csv")) == {"FINISHED"}
     camera = the_camera(window)

@@ -79,7 +79,7 @@ def case_back_analysis_of_tables(window):
     scene = bpy.context.scene
     picks = [obj for obj in scene.objects if obj.get("rockfall_role") == "pick"]
     x, y, z = (sum(obj.location[axis] for obj in picks) / len(picks) for axis in range(3))
-    window.part("rockfall_addon.scene.screens").make(scene, [(x, y - 20, z), (x, y + 20, z)], "Road")
+    window.part("rockfall_addon.scene.simulation.screens").make(scene, [(x, y - 20, z), (x, y + 20, z)], "Road")
     scene.rockfall_back_analysis.source = {"SCENE", "STOPS"}
     settings = bpy.context.scene.rockfall_back_analysis
     settings.releases, settings.stops = str(data / "tschamut_2014_releases.csv"), str(data / "tschamut_2014_stops.csv")

@@ -62,7 +62,7 @@ def selected_rows(window):
 
 
 def table(window):
-    return window.part("rockfall_addon.scene.comparison").comparison_of(bpy.context.scene)
+    return window.part("rockfall_addon.scene.models.comparison").comparison_of(bpy.context.scene)
 
 
 def picks_of(name):

@@ -35,7 +35,7 @@ def with_picks(window):
     yield 1.0
     scene = bpy.context.scene
     picks = sorted((o for o in scene.objects if o.get("rockfall_role") == "pick"), key=lambda o: o["rockfall_time_s"])
-    window.part("rockfall_addon.scene.impact_rows").go_to(bpy.context, scene, picks[3])
+    window.part("rockfall_addon.scene.picks.impact_rows").go_to(bpy.context, scene, picks[3])
     with window.override():
         bpy.ops.wm.tool_set_by_id(name="rockfall.pick_tool")
     yield 1.0
@@ -73,7 +73,7 @@ def case_type_a_density(window):
         window.unfold(f"ROCKFALL_PT_{panel}", False)
     yield from with_picks(window)
     x, header = yield from window.open_panel("ROCKFALL_PT_picks")
-    block_of = window.part("rockfall_addon.scene.places").block_of
+    block_of = window.part("rockfall_addon.scene.picks.places").block_of
     before = block_of(bpy.context.scene, "B10")
     bpy.context.scene.rockfall_block.own = True
     with window.override():
@@ -127,5 +127,5 @@ def case_a_scan_in_feet_is_read_again(window):
     yield 1.0
     window.screenshot("3-again")
     assert abs(ground().dimensions.x - 40) < 0.001
-    shift = window.part("rockfall_addon.scene.georeference").read_shift(scene)
+    shift = window.part("rockfall_addon.scene.terrain.georeference").read_shift(scene)
     assert abs(shift.x - 2.6e6) < 1000, "the shift is that of the right place"

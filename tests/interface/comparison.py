@@ -60,7 +60,7 @@ def case_sidebar_of_the_graphs(window):
     yield from window.click(sidebar.x + 60, top - 377, ctrl=True)
     yield 2.0
     window.screenshot("calibrated")
-    assert set(window.part("rockfall_addon.scene.comparison").comparison_of(scene).predictions) == {"A", "B"}
+    assert set(window.part("rockfall_addon.scene.models.comparison").comparison_of(scene).predictions) == {"A", "B"}
 
 
 def spread_of(window):
@@ -77,7 +77,7 @@ def case_drag_a_slider_calibrate_and_undo(window):
     with window.override():
         bpy.ops.rockfall.show_models("EXEC_DEFAULT", True, models={MODEL})
     yield 1.0
-    keep = window.part("rockfall_addon.scene.model_parameters")
+    keep = window.part("rockfall_addon.scene.models.model_parameters")
     moves, original = [], keep.keep
 
     def timed(*arguments):

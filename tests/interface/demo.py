@@ -39,7 +39,7 @@ def case_demo_survives_undo_redo_and_another_frame_rate(window):
     yield 2.0
 
     def state():
-        picks = window.part("rockfall_addon.scene.picks").picks_of(bpy.context.scene)
+        picks = window.part("rockfall_addon.scene.picks.picks").picks_of(bpy.context.scene)
         return picks.position.tolist(), picks.time_s.tolist()
 
     def place(seconds):

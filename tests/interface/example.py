@@ -17,5 +17,5 @@ def case_instrumented_impacts_without_terrain(window):
     bpy.context.view_layer.objects.active = pick
     yield 3.0
     window.screenshot("chant-sura")
-    speed = sum(v * v for v in window.part("rockfall_addon.scene.impact_numbers").of(pick)["incident_mps"]) ** 0.5
+    speed = sum(v * v for v in window.part("rockfall_addon.scene.picks.impact_numbers").of(pick)["incident_mps"]) ** 0.5
     assert abs(speed / 17.46 - 1) < 0.11, "the instrument said 17.46 m/s"

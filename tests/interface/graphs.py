@@ -46,7 +46,7 @@ def case_statistics_beside_the_graphs(window):
     with window.override():
         bpy.ops.rockfall.colour_graphs(column="theta1_deg")
     yield 1.0
-    kept = window.part("rockfall_addon.scene.statistics")._kept
+    kept = window.part("rockfall_addon.scene.picks.statistics")._kept
     assert not kept, "a folded panel computes nothing"
     yield from window.open_panel("ROCKFALL_PT_graph_statistics", "NODE_EDITOR")
     window.screenshot("dark")
@@ -118,7 +118,7 @@ def lonely(points):
 
 
 def selected_rows(window):
-    compared = window.part("rockfall_addon.scene.comparison").comparison_of(bpy.context.scene)
+    compared = window.part("rockfall_addon.scene.models.comparison").comparison_of(bpy.context.scene)
     ids = {o.get("rockfall_id") for o in bpy.context.selected_objects if o.get("rockfall_role") == "pick"}
     return {row for row, identifier in enumerate(compared.pick) if identifier in ids}
 
@@ -178,7 +178,7 @@ def case_select_in_graphs(window):
     assert selected_rows(window) == {first}
     yield 1.0
     window.screenshot("lasso")
-    pick = window.part("rockfall_addon.scene.comparison").comparison_of(bpy.context.scene).pick
+    pick = window.part("rockfall_addon.scene.models.comparison").comparison_of(bpy.context.scene).pick
     some = sorted(points)[10:13]
     others = [o for o in bpy.context.scene.objects if o.get("rockfall_id") in {pick[row] for row in some}]
     for obj in bpy.context.selected_objects:
@@ -318,7 +318,7 @@ def case_a_hundred_thousand_impacts(window):
     """A table of other sites beside the scene's own impacts: drawn, pointed at, selected, zoomed."""
     yield from open_graphs(window)
     scene, tables = bpy.context.scene, window.part("core.exchange.tables")
-    impacts = window.part("rockfall_addon.scene.comparison").comparison_of(scene).impacts
+    impacts = window.part("rockfall_addon.scene.models.comparison").comparison_of(scene).impacts
     path = f"{bpy.app.tempdir}many.csv"
     write_many(tables, impacts, path, 100_000)
     with window.override():

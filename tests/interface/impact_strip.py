@@ -22,7 +22,7 @@ def mark(window, number):
     """Where a mark is in the window, and the pick that it stands for."""
     strip, here = strip_of(window)
     x, y = strip.places()[number]
-    pick = window.part("rockfall_addon.scene.picks").with_id(bpy.context.scene, strip.marks.identifier[number])
+    pick = window.part("rockfall_addon.scene.picks.picks").with_id(bpy.context.scene, strip.marks.identifier[number])
     return (here.x + x, here.y + y), pick
 
 
@@ -52,7 +52,7 @@ def case_impact_strip_shows_goes_and_retimes(window):
     _, pick = mark(window, number)
     moved = pick["rockfall_time_s"] - before
     assert abs(moved - pixels / strip.per_frame / rate) < 0.5 / rate, "as far as the mouse"
-    numbers = window.part("rockfall_addon.scene.impact_numbers").of
+    numbers = window.part("rockfall_addon.scene.picks.impact_numbers").of
     speeds = [numbers(obj)["incident_mps"] for obj in picks if obj["rockfall_id"] == identifier]
     assert not window.window.modal_operators, "let go"
     window.screenshot("retimed")

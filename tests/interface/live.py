@@ -34,7 +34,7 @@ def load(window):
 
 def consistent(window, name, held=False):
     """What is shown is what the picks give; while they are held, where they are held."""
-    reconstruction = window.part("rockfall_addon.scene.reconstruction")
+    reconstruction = window.part("rockfall_addon.scene.picks.reconstruction")
     result = reconstruction.reconstruct_scene(bpy.context.scene)
     for pick in () if held else picks_of(name):
         rows = np.flatnonzero(result.picks.time_s == pick["rockfall_time_s"])
@@ -83,10 +83,10 @@ def case_live_drag_undo_redo(window):
     yield 0.5
     dragged = picks_of("B03")[3]
     assert list(dragged["rockfall_position_m"]) == before, "while it is dragged nothing is written"
-    assert window.part("rockfall_addon.scene.sync").is_dragging()
+    assert window.part("rockfall_addon.scene.footage.sync").is_dragging()
     moved = (dragged.location - dragged.location.__class__(before)).length
     assert moved > 0.5
-    surface = window.part("rockfall_addon.scene.reconstruction").ground(bpy.context.scene)
+    surface = window.part("rockfall_addon.scene.picks.reconstruction").ground(bpy.context.scene)
     near = window.part("core.terrain.raycast").closest_points(surface, np.array([dragged.location]))
     assert distance(near.point[0], "B03") < 0.02, "the flights follow while it is dragged"
     window.screenshot("dragging")

@@ -24,7 +24,7 @@ def case_many_picks(window):
     """Stopped by Esc it changes nothing; not stopped it shows them all, as one undo step."""
     path = Path(tempfile.mkdtemp()) / "picks.csv"
     write_table(path)
-    job, store = (window.part(name) for name in ("rockfall_addon.view.job", "rockfall_addon.scene.store"))
+    job, store = (window.part(name) for name in ("rockfall_addon.view.job", "rockfall_addon.scene.storage.store"))
     window.part("rockfall_addon.steps.picking.table_operators").MANY_PICKS = 100
     scene = bpy.context.scene
     with window.override():
@@ -52,7 +52,7 @@ def case_many_picks(window):
 
 def stopped_while_shown(window, path):
     """Esc while the trajectories are shown takes back those that are there already."""
-    job, store = (window.part(name) for name in ("rockfall_addon.view.job", "rockfall_addon.scene.store"))
+    job, store = (window.part(name) for name in ("rockfall_addon.view.job", "rockfall_addon.scene.storage.store"))
     job.SHOWING_S = 0.0
     with window.override():
         assert bpy.ops.rockfall.import_picks(filepath=str(path)) == {"INTERFACE"}

@@ -19,7 +19,7 @@ def case_maps_of_the_demo(window):
         bpy.ops.ed.undo_push(message="demo")
     yield 1.0
     yield from window.open_panel("ROCKFALL_PT_simulation")
-    maps = window.part("rockfall_addon.scene.hazard_maps")
+    maps = window.part("rockfall_addon.scene.simulation.hazard_maps")
     job = window.part("rockfall_addon.view.job")
     settings().map_number = 100
     with window.override():
@@ -32,7 +32,7 @@ def case_maps_of_the_demo(window):
     low = np.where(np.arange(values.shape[0])[:, None] < 45, np.nan_to_num(values), 0.0)
     row, column = np.unravel_index(np.argmax(low), low.shape)
     x, y = (np.array([column, row]) + 0.5) * found.cells.size_m + [found.cells.x0_m, found.cells.y0_m]
-    surface = window.part("rockfall_addon.scene.simulation_setup").ground(scene)
+    surface = window.part("rockfall_addon.scene.simulation.simulation_setup").ground(scene)
     raycast = window.part("core.terrain.raycast")
     z = raycast.cast_rays(surface, [[x, y, 1e4]], [[0, 0, -1]]).point[0, 2]
     region, view = window.region(), window.area().spaces.active.region_3d

@@ -68,7 +68,7 @@ def case_motion_graphs_move_the_time(window):
     window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(first[0]), y=round(first[1]))
     yield 0.3
 
-    motion = window.part("rockfall_addon.scene.motion").motion_of(scene)
+    motion = window.part("rockfall_addon.scene.models.motion").motion_of(scene)
     speed = window.part("core.analysis.motion_graphs").SPEED
     course, time_s = alone(motion.courses, speed)
     yield from window.move(*place(window, 0, time_s, course.at(speed, time_s)))
@@ -109,7 +109,7 @@ def case_motion_graphs_follow(window):
     )[3]
     pick.select_set(True)
     bpy.context.view_layer.objects.active = pick
-    motion = window.part("rockfall_addon.scene.motion")
+    motion = window.part("rockfall_addon.scene.models.motion")
     before = {one.trajectory: one for one in motion.motion_of(scene).courses}
     x, y = window.centre()
     yield from window.press("G", x, y)

@@ -79,7 +79,7 @@ def everything(window):
     picks = sorted((o for o in scene.objects if o.get("rockfall_role") == "pick"), key=lambda o: o["rockfall_time_s"])
     middle = np.mean([obj.location for obj in picks], axis=0)
     aside = np.array([0.0, 20.0, 0.0])
-    window.part("rockfall_addon.scene.screens").make(scene, [middle - aside, middle + aside], "Road")
+    window.part("rockfall_addon.scene.simulation.screens").make(scene, [middle - aside, middle + aside], "Road")
     settings, questions = scene.rockfall_simulation, scene.rockfall_back_analysis
     settings.models, settings.number, settings.map_number = {"noel_2017", "stevens_1998"}, 20, 50
     questions.model, questions.sets, questions.rounds, questions.at_screens = "stevens_1998", 150, 1, True
@@ -94,5 +94,5 @@ def everything(window):
     with window.override():
         assert bpy.ops.rockfall.set_up_film() == {"FINISHED"}
     assert [view.view_perspective for view in views] == ["CAMERA", "PERSP"], "the free view stays free"
-    window.part("rockfall_addon.scene.impact_rows").go_to(bpy.context, scene, picks[3])
+    window.part("rockfall_addon.scene.picks.impact_rows").go_to(bpy.context, scene, picks[3])
     yield 2.0

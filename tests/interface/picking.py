@@ -25,7 +25,7 @@ def local(row, *names):
 
 
 def camera_of(window):
-    return window.part("rockfall_addon.scene.videos").cameras(bpy.context.scene)[0]
+    return window.part("rockfall_addon.scene.footage.videos").cameras(bpy.context.scene)[0]
 
 
 def open_site(window):
@@ -34,14 +34,14 @@ def open_site(window):
     with window.override():
         bpy.ops.object.select_all(action="SELECT")
         bpy.ops.object.delete()
-    new_videos = window.part("rockfall_addon.scene.new_videos")
-    clocks = window.part("rockfall_addon.scene.clocks")
-    camera_paths = window.part("rockfall_addon.scene.camera_paths")
+    new_videos = window.part("rockfall_addon.scene.footage.new_videos")
+    clocks = window.part("rockfall_addon.scene.footage.clocks")
+    camera_paths = window.part("rockfall_addon.scene.footage.camera_paths")
     model = window.part("core.camera.model")
     shift = window.part("core.georeference").GlobalShift(*ORIGIN)
     surface = window.part("core.terrain.readers").read_terrain(ROOT / "assets" / "demo" / "terrain.ply", shift=shift)
     shading = window.part("core.terrain.shading").shade(surface)
-    window.part("rockfall_addon.scene.terrain").add_terrain(scene, surface, shading)
+    window.part("rockfall_addon.scene.terrain.terrain").add_terrain(scene, surface, shading)
     camera = new_videos.add_video(scene, FOOTAGE / "footage.mp4")
     poses = rows("camera.csv")
     place = np.array([local(row, "x_m", "y_m", "z_m") for row in poses])
@@ -124,7 +124,7 @@ def case_pick_impacts_in_the_footage(window):
     for step in range(1, 7):
         yield from window.move(x + 6 * step, y)
     window.screenshot("dragging")
-    assert window.part("rockfall_addon.scene.sync").is_dragging()
+    assert window.part("rockfall_addon.scene.footage.sync").is_dragging()
     window.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=round(x + 36), y=round(y))
     yield 1.0
     after = list(picks()[-1]["rockfall_position_m"])
@@ -199,9 +199,9 @@ def case_pick_refine(window):
     track = window.part("core.footage.tracking").BlockTrack(
         table.frame, table.time_s, table.pixel, table.sigma_px, one, table.pixel, 9 * one, ("", "")
     )
-    window.part("rockfall_addon.scene.sightings").keep_track(camera_of(window), "B10", track)
+    window.part("rockfall_addon.scene.footage.sightings").keep_track(camera_of(window), "B10", track)
     picks()[1]["rockfall_time_s"] += 0.03
-    window.part("rockfall_addon.scene.sync").sync(scene)
+    window.part("rockfall_addon.scene.footage.sync").sync(scene)
     with window.override():
         bpy.ops.ed.undo_push(message="track")
     scene.frame_set(80)
@@ -217,7 +217,7 @@ def case_pick_refine(window):
     window.redraw()
     yield 1.5
     window.screenshot("proposed")
-    found = window.part("rockfall_addon.scene.proposal").read(scene)
+    found = window.part("rockfall_addon.scene.picks.proposal").read(scene)
     assert found.after_px < 1.5 < found.before_px, found
     with window.override():
         assert bpy.ops.rockfall.apply_refinement() == {"FINISHED"}
@@ -326,7 +326,7 @@ def case_pick_track_the_block(window):
         x, y = on_screen(window, [float(block[frame]["u_px"]), float(block[frame]["v_px"])])
         yield from window.click(x, y)
         yield 0.3
-    camera, sightings = camera_of(window), window.part("rockfall_addon.scene.sightings")
+    camera, sightings = camera_of(window), window.part("rockfall_addon.scene.footage.sightings")
     assert not picks(), "in flight the pixel is kept, not a place"
     assert sightings.seen_in(camera, "B10").frame.tolist() == [70, 100]
     scene.rockfall_picking.whole_video, scene.rockfall_picking.track_frames = False, 55
@@ -372,9 +372,9 @@ def case_pick_in_two_views(window):
     scene = bpy.context.scene
     _, impacts = yield from pick_impacts(window, 1, 2)
     truth = local(impacts[0], "x_m", "y_m", "z_m")
-    new_videos = window.part("rockfall_addon.scene.new_videos")
-    clocks = window.part("rockfall_addon.scene.clocks")
-    camera_paths = window.part("rockfall_addon.scene.camera_paths")
+    new_videos = window.part("rockfall_addon.scene.footage.new_videos")
+    clocks = window.part("rockfall_addon.scene.footage.clocks")
+    camera_paths = window.part("rockfall_addon.scene.footage.camera_paths")
     model = window.part("core.camera.model")
     second = new_videos.add_video(scene, FOOTAGE / "footage.mp4")
     clocks.set_clock(second, window.part("core.footage.clock").Clock(OFFSET_S))
@@ -399,7 +399,7 @@ def case_pick_in_two_views(window):
     window.screenshot("diamond")
     (obj,) = picks()
     assert list(obj["rockfall_position_m"]) == held, "the pick stays until it is told to move"
-    clicks = window.part("rockfall_addon.scene.clicks")
+    clicks = window.part("rockfall_addon.scene.footage.clicks")
     found = clicks.triangulated(scene, obj)
     assert 0.001 < found.miss_distance[0] < 2.0, found.miss_distance
     with window.override():

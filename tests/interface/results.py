@@ -42,7 +42,7 @@ def case_result_is_seen(window):
     assert all(0 <= x <= here.width and 0 <= y <= here.height for x, y in places)
     assert seen.spaces.active.region_3d.view_perspective == "CAMERA", "the footage stays where it is worked in"
     picks = sorted((o for o in scene.objects if o.get("rockfall_role") == "pick"), key=lambda o: o["rockfall_time_s"])
-    rows = window.part("rockfall_addon.scene.impact_rows")
+    rows = window.part("rockfall_addon.scene.picks.impact_rows")
     rows.go_to(bpy.context, scene, picks[3])
     yield 1.5
     window.screenshot("card")

@@ -39,7 +39,7 @@ def case_screen_across_the_slope(window):
     )
     shading = window.part("core.terrain.shading").shade(surface)
     scene = bpy.context.scene
-    window.part("rockfall_addon.scene.terrain").add_terrain(scene, surface, shading)
+    window.part("rockfall_addon.scene.terrain.terrain").add_terrain(scene, surface, shading)
     settings = scene.rockfall_simulation
     settings.source, settings.steeper_than_deg, settings.number = "STEEP", 20.0, 60
     with window.override():

@@ -89,7 +89,7 @@ def case_simulate_from_a_line_on_a_bare_scan(window):
 def pick_a_path(window, name):
     """Click the middle of a path of the first model; its numbers are in the panel."""
     paths = shown("simulated_paths")[0]
-    simulated_paths = window.part("rockfall_addon.scene.simulated_paths")
+    simulated_paths = window.part("rockfall_addon.scene.simulation.simulated_paths")
     lines = simulated_paths.lines_of(paths)
     longest = int(np.argmax(lines.figures["length_m"]))
     middle = (lines.first[longest] + lines.first[longest + 1]) // 2
@@ -145,7 +145,7 @@ def case_simulate_beside_the_real_blocks(window):
     yield from window.wait_for(lambda: not job.is_running(), 60, "stopped")
     yield 1.0
     window.screenshot("3-stopped")
-    said = window.part("rockfall_addon.scene.simulation_setup").remarks(bpy.context.scene)
+    said = window.part("rockfall_addon.scene.simulation.simulation_setup").remarks(bpy.context.scene)
     assert any("Stopped by you" in remark.text for remark in said)
     with window.override():
         bpy.ops.rockfall.simulate("INVOKE_DEFAULT")

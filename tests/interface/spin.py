@@ -17,7 +17,7 @@ RADIUS = 0.195
 
 def pixel_of(window, frame, turns):
     """A point of the near side of the true block that has made some turns about the axis of rolling."""
-    pictures, project = window.part("rockfall_addon.scene.pictures"), window.part("core.camera.model").project
+    pictures, project = window.part("rockfall_addon.scene.footage.pictures"), window.part("core.camera.model").project
     block = {int(row["frame"]): row for row in rows("block.csv")}
     lens = pictures.posed(camera_of(window), frame / 30)
     centre = np.array([float(block[frame][f"{axis}_m"]) for axis in "xyz"]) - (988400.0, 6375600.0, 1500.0)
@@ -48,7 +48,7 @@ def zoom_on(window, pixel):
 def case_mark_the_spin_of_a_flight(window):
     yield from open_site(window)
     scene = bpy.context.scene
-    spins = window.part("rockfall_addon.scene.spins")
+    spins = window.part("rockfall_addon.scene.picks.spins")
     _, impacts = yield from pick_impacts(window, 2)
     assert len(picks()) == 2
     with window.override():

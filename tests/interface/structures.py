@@ -17,7 +17,7 @@ def case_wall_across_the_slope(window):
         vertices, faces, window.part("core.georeference").GlobalShift(), "slope", ()
     )
     shading = window.part("core.terrain.shading").shade(surface)
-    window.part("rockfall_addon.scene.terrain").add_terrain(bpy.context.scene, surface, shading)
+    window.part("rockfall_addon.scene.terrain.terrain").add_terrain(bpy.context.scene, surface, shading)
     with window.override():
         bpy.ops.rockfall.show_relief(frame_all=True)
         bpy.ops.mesh.primitive_plane_add(size=1.0, location=(75.0, 50.0, -55.0), rotation=(0.0, np.pi / 2, 0.0))
@@ -42,5 +42,5 @@ def case_wall_across_the_slope(window):
     window.screenshot("3-held")
     wall.location.x += 5.0
     yield 1.0
-    assert window.part("rockfall_addon.scene.simulation_setup").is_stale(bpy.context.scene)
+    assert window.part("rockfall_addon.scene.simulation.simulation_setup").is_stale(bpy.context.scene)
     window.screenshot("4-moved")

@@ -77,7 +77,7 @@ def case_a_slope_that_stands_upright_asks_whether_y_points_up(window):
 def case_the_terrain_takes_the_colours_of_the_footage(window):
     """By its button, in the background; the camera's view then lies on the terrain, also from another place."""
     job = window.part("rockfall_addon.view.job")
-    colours = window.part("rockfall_addon.scene.terrain_colours")
+    colours = window.part("rockfall_addon.scene.terrain.terrain_colours")
     with window.override():
         assert bpy.ops.rockfall.load_footage_demo() == {"FINISHED"}
         bpy.ops.rockfall.show_relief()
@@ -222,7 +222,7 @@ def case_a_scan_in_millimetres_is_noticed(window):
     assert abs(ground.dimensions.x - 40) < 0.01, "read in millimetres"
     with window.override():
         bpy.ops.rockfall.remove_terrain()
-        window.part("rockfall_addon.scene.georeference").forget_shift(scene)
+        window.part("rockfall_addon.scene.terrain.georeference").forget_shift(scene)
         assert bpy.ops.rockfall.import_terrain(filepath=str(folder / "local.obj"), unit_m=1.0) == {"FINISHED"}
     with window.override("VIEW_3D"):
         window.part("rockfall_addon.view.look").show_relief(bpy.context, frame_all=True)

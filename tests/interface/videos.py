@@ -51,7 +51,10 @@ def case_every_picture_on_the_screen(window):
     space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
     space.overlay.show_text = space.show_gizmo = space.overlay.show_cursor = False
     space.shading.background_type = "VIEWPORT"
-    videos, clocks = window.part("rockfall_addon.scene.videos"), window.part("rockfall_addon.scene.clocks")
+    videos, clocks = (
+        window.part("rockfall_addon.scene.footage.videos"),
+        window.part("rockfall_addon.scene.footage.clocks"),
+    )
     scene = bpy.context.scene
     for name in ("constant.mp4", "variable.mp4"):
         add(window, name)
@@ -75,7 +78,7 @@ def case_pixels_of_the_view(window):
     """Where the core sees points is where Blender draws them, zoomed and shifted."""
     yield 0.5
     add(window, FOOTAGE.name, directory=FOOTAGE.parent)
-    view, videos = window.part("rockfall_addon.view.image_view"), window.part("rockfall_addon.scene.videos")
+    view, videos = window.part("rockfall_addon.view.image_view"), window.part("rockfall_addon.scene.footage.videos")
     scene = bpy.context.scene
     camera = videos.active_camera(scene)
     camera.location = (12.0, -30.0, 8.0)
@@ -103,7 +106,7 @@ def case_pixels_of_the_view(window):
 
 def bars(window, camera, path):
     """The number that the bars on the screen tell."""
-    view, videos = window.part("rockfall_addon.view.image_view"), window.part("rockfall_addon.scene.videos")
+    view, videos = window.part("rockfall_addon.view.image_view"), window.part("rockfall_addon.scene.footage.videos")
     region, space = window.region(), window.area().spaces.active
     rectangle = view.image_rectangle(region, space.region_3d, bpy.context.scene, camera)
     image = bpy.data.images.load(str(path))
@@ -127,7 +130,10 @@ def case_video_undone_and_redone(window):
         bpy.ops.ed.undo_push(message="before")
         bpy.ops.rockfall.add_video("EXEC_DEFAULT", True, filepath=str(DATA / "constant.mp4"))
     yield 1.0
-    videos, clocks = window.part("rockfall_addon.scene.videos"), window.part("rockfall_addon.scene.clocks")
+    videos, clocks = (
+        window.part("rockfall_addon.scene.footage.videos"),
+        window.part("rockfall_addon.scene.footage.clocks"),
+    )
     (camera,) = videos.cameras(bpy.context.scene)
     identifier = camera["rockfall_id"]
     with window.override():
@@ -167,7 +173,7 @@ def case_video_proxy(window):
     space = window.area().spaces.active
     space.overlay.show_floor = space.overlay.show_axis_x = space.overlay.show_axis_y = False
     space.overlay.show_text = space.show_gizmo = space.overlay.show_cursor = False
-    videos = window.part("rockfall_addon.scene.videos")
+    videos = window.part("rockfall_addon.scene.footage.videos")
     for name in ("constant.mp4", "variable.mp4"):
         folder = Path(tempfile.mkdtemp())
         shutil.copy(DATA / name, folder)

@@ -28,7 +28,7 @@ def case_random_walk(window):
     with window.override():
         walk.begin()
     yield 1.0
-    undo = window.part("rockfall_addon.scene.undo")
+    undo = window.part("rockfall_addon.scene.storage.undo")
     extend = undo.extend_last_step
     undo.extend_last_step = lambda _name=None: extend(walk.pushed)  # the walk stores the steps, not operators
     try:

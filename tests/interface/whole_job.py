@@ -70,12 +70,12 @@ def import_demo(window):
         bpy.ops.ed.undo_push(message="imported")
     yield 2.0
     window.screenshot("2-imported")
-    assert not window.part("rockfall_addon.scene.camera_paths").is_solved(aligning.the_camera(window))
+    assert not window.part("rockfall_addon.scene.footage.camera_paths").is_solved(aligning.the_camera(window))
 
 
 def align(window):
     """Six pairs: five of two clicks; of the sixth, the predicted mark is dragged to where the place is seen."""
-    aligned, pairs = (window.part(f"rockfall_addon.scene.{name}") for name in ("alignment", "pairs"))
+    aligned, pairs = (window.part(f"rockfall_addon.scene.{name}") for name in ("footage.alignment", "footage.pairs"))
     ground = aligning.table(window)
     for count, i in enumerate(PAIRS):
         aligning.look_at(window, ground.point[[i]])
@@ -93,7 +93,9 @@ def align(window):
             yield from drag(window, aligning.in_picture(window, pair.pixel), goal)
         assert pairs.open_pair(aligning.the_camera(window)) is None, f"pair {count} is complete"
     camera = aligning.the_camera(window)
-    assert window.part("rockfall_addon.scene.camera_paths").is_solved(camera), aligned.solution_of(camera).problem
+    assert window.part("rockfall_addon.scene.footage.camera_paths").is_solved(camera), aligned.solution_of(
+        camera
+    ).problem
     assert sum(pair.is_complete for pair in pairs.pairs_of(camera)) == len(PAIRS)
     focal = aligned.focal_px(camera)
     print(f"focal length {focal:.0f} px, {aligned.solution_of(camera).rmse_px:.2f} px left")
@@ -140,7 +142,7 @@ def impacts():
 
 def misses(window):
     """Distances of the picks from where the block truly touched the ground [m]."""
-    shift = window.part("rockfall_addon.scene.georeference").read_shift(bpy.context.scene).vector
+    shift = window.part("rockfall_addon.scene.terrain.georeference").read_shift(bpy.context.scene).vector
     axes = ("contact_x_m", "contact_y_m", "contact_z_m")
     truth = np.array([[float(row[name]) for name in axes] for row in impacts()]) - shift
     return np.linalg.norm([list(obj["rockfall_position_m"]) for obj in picking.picks()] - truth, axis=1)
@@ -201,12 +203,12 @@ def refine(window):
     track = window.part("core.footage.tracking").BlockTrack(
         table.frame, table.time_s, table.pixel, table.sigma_px, one, table.pixel, 9 * one, ("", "")
     )
-    window.part("rockfall_addon.scene.sightings").keep_track(aligning.the_camera(window), NAME, track)
+    window.part("rockfall_addon.scene.footage.sightings").keep_track(aligning.the_camera(window), NAME, track)
     with in_left_view(window):
         bpy.ops.ed.undo_push(message="track")
         assert bpy.ops.rockfall.refine() == {"FINISHED"}
         bpy.ops.ed.undo_push(message="refined")
-    found = window.part("rockfall_addon.scene.proposal").read(scene)
+    found = window.part("rockfall_addon.scene.picks.proposal").read(scene)
     yield from window.move(*window.centre("DOPESHEET_EDITOR"))  # the loupe is not to hide the path
     yield 1.0
     window.screenshot("7-proposed")
@@ -227,7 +229,7 @@ def refine(window):
 
 def speed_errors(window):
     """Relative errors of the speeds at which the two flights begin and end."""
-    flights = window.part("rockfall_addon.scene.reconstruction").reconstruct_scene(bpy.context.scene).flights
+    flights = window.part("rockfall_addon.scene.picks.reconstruction").reconstruct_scene(bpy.context.scene).flights
     states = window.part("core.reconstruction.flight").flight_states
     rows, count = impacts(), len(flights.start_time_s)
     assert count == len(rows) - 1

@@ -16,7 +16,7 @@ def region(area, kind):
 def open_it(window):
     with window.override():
         assert bpy.ops.rockfall.open_workspace() == {"FINISHED"}
-    store = window.part("rockfall_addon.scene.store")
+    store = window.part("rockfall_addon.scene.storage.store")
     yield from window.wait_for(lambda: store.WORKSPACE in window.window.workspace, what="the workspace")
     yield 1.5
 
@@ -68,7 +68,7 @@ def case_workspace_with_the_footage(window):
     assert seen.spaces.active.region_3d.view_perspective == "CAMERA"
     assert free.spaces.active.region_3d.view_perspective == "PERSP"
     view = window.part("rockfall_addon.view.image_view")
-    camera = window.part("rockfall_addon.scene.videos").active_camera(scene)
+    camera = window.part("rockfall_addon.scene.footage.videos").active_camera(scene)
     here, sidebar = region(seen, "WINDOW"), region(seen, "UI")
     rectangle = view.image_rectangle(here, seen.spaces.active.region_3d, scene, camera)
     assert rectangle.left >= 0
@@ -128,7 +128,7 @@ def case_first_clicks_of_the_manual(window):
     seen, _ = views(window)
     here = region(seen, "WINDOW")
     view = window.part("rockfall_addon.view.image_view")
-    camera = window.part("rockfall_addon.scene.videos").active_camera(scene)
+    camera = window.part("rockfall_addon.scene.footage.videos").active_camera(scene)
     rectangle = view.image_rectangle(here, seen.spaces.active.region_3d, scene, camera)
     for pixel, presses in (((921.974, 114.007), 38), ((726.5, 346.1), 0)):  # the first two impacts
         x, y = view.to_region(rectangle, (1280, 720), pixel)

@@ -17,7 +17,7 @@ def case_zone_of_selected_vertices(window):
         vertices, faces, window.part("core.georeference").GlobalShift(), "slope", ()
     )
     shading = window.part("core.terrain.shading").shade(surface)
-    tile = window.part("rockfall_addon.scene.terrain").add_terrain(bpy.context.scene, surface, shading)
+    tile = window.part("rockfall_addon.scene.terrain.terrain").add_terrain(bpy.context.scene, surface, shading)
     with window.override():
         bpy.context.view_layer.objects.active = tile
         tile.select_set(True)
@@ -34,7 +34,7 @@ def case_zone_of_selected_vertices(window):
     settings = bpy.context.scene.rockfall_simulation
     settings.zones[0].friction, settings.zones[0].parameters = 0.9, "rt = 0.4"
     settings.source, settings.steeper_than_deg, settings.number = "STEEP", 20.0, 20
-    zones = window.part("rockfall_addon.scene.simulation_setup").plan(bpy.context.scene).scenario.zones
+    zones = window.part("rockfall_addon.scene.simulation.simulation_setup").plan(bpy.context.scene).scenario.zones
     assert np.bincount(zones.of_face).tolist() == [2 * 50 * 30 - 50, 2 * 50 * 20 + 50]
     with window.override():
         bpy.ops.rockfall.simulate("INVOKE_DEFAULT")

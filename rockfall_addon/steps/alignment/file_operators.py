@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ....core.errors import RockfallError
-from ...scene import alignment, pairs, videos
+from ...scene.footage import alignment, pairs, videos
 from ...view.from_file import FromFile
 from ...view.of_video import OfVideo, has_solved, has_video
 from ...view.reporting import possible, reported

@@ -14,7 +14,9 @@ from ....core.exchange.cameras import read_camera, read_pairs, write_camera, wri
 from ....core.exchange.tables import POSITION, vector_columns, write_columns
 from ....core.output import output_folder
 from ....core.workflow.uprightness import turned_pairs
-from ...scene import alignment, camera_paths, clocks, georeference, pairs, store, terrain, videos
+from ...scene.footage import alignment, camera_paths, clocks, pairs, videos
+from ...scene.storage import store
+from ...scene.terrain import georeference, terrain
 from . import solving
 
 OTHER_VIDEO = "Choose the table of this video, in pixels of this size"

@@ -17,7 +17,9 @@ from ....core.progress import Progress
 from ....core.remarks import from_plain, to_plain
 from ....core.workflow.alignment import SolvedFrames
 from ....core.workflow.following import Background, FollowedCamera, follow_background
-from ...scene import alignment, camera_paths, pairs, store, terrain, video_files, videos
+from ...scene.footage import alignment, camera_paths, pairs, video_files, videos
+from ...scene.storage import store
+from ...scene.terrain import terrain
 from ...view import job
 from . import solving
 

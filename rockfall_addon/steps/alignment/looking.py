@@ -12,7 +12,9 @@ from ....core.camera.path import rays_at
 from ....core.errors import RockfallError
 from ....core.terrain.raycast import cast_ray
 from ....core.vectors import Array
-from ...scene import alignment, camera_paths, georeference, pairs, store, terrain, videos
+from ...scene.footage import alignment, camera_paths, pairs, videos
+from ...scene.storage import store
+from ...scene.terrain import georeference, terrain
 
 type Point = tuple[float, float, float]
 

@@ -11,8 +11,9 @@ import numpy as np
 from ....core.camera.path import project_at
 from ....core.errors import RockfallError
 from ....core.vectors import Array
-from ...scene import alignment, camera_paths, clocks, pairs, store, videos
-from ...scene.pairs import PIXEL, POINT, Pair, keep_pairs, open_pair, pairs_of, with_id
+from ...scene.footage import alignment, camera_paths, clocks, pairs, videos
+from ...scene.footage.pairs import PIXEL, POINT, Pair, keep_pairs, open_pair, pairs_of, with_id
+from ...scene.storage import store
 from . import looking
 from .solving import fill_rows, solve
 

@@ -9,8 +9,10 @@ from mathutils import Vector
 
 from ....core.camera.resection.problem import POSE_PAIRS
 from ....core.errors import RockfallError
-from ...scene import alignment, camera_paths, clocks, footage_blend, pairs, store, terrain, videos
+from ...scene.footage import alignment, camera_paths, clocks, footage_blend, pairs, videos
 from ...scene.next_step import ALIGN_TOOL
+from ...scene.storage import store
+from ...scene.terrain import terrain
 from ...view import image_view, job, look, workspace
 from ...view.of_video import OfVideo, has_solved, has_video
 from ...view.reporting import possible, reported

@@ -14,8 +14,10 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Vector
 
 from ....core.errors import visible
-from ...scene import alignment, camera_paths, clocks, pairs, problems, store, video_files, videos
+from ...scene import problems
+from ...scene.footage import alignment, camera_paths, clocks, pairs, video_files, videos
 from ...scene.next_step import ALIGN_TOOL
+from ...scene.storage import store
 from ...view import image_view
 from ...view.wrapping import wrapped
 from . import marking

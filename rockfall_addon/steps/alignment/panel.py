@@ -5,7 +5,8 @@ import math
 
 import bpy
 
-from ...scene import alignment, camera_paths, georeference, pairs, videos
+from ...scene.footage import alignment, camera_paths, pairs, videos
+from ...scene.terrain import georeference
 from ...view import job
 from ...view.panel import RockfallPanel, Rows, State, advise, facts, paragraph, show_remarks
 from . import following

@@ -4,7 +4,8 @@
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ...scene import alignment, footage_blend, store
+from ...scene.footage import alignment, footage_blend
+from ...scene.storage import store
 from . import marking, solving
 
 

@@ -14,8 +14,10 @@ from ....core.camera.resection.problem import needed_pairs
 from ....core.errors import RockfallError
 from ....core.vectors import Array
 from ....core.workflow.alignment import AlignmentOptions, SolvedFrames, align
-from ...scene import alignment, camera_paths, georeference, pairs, store, videos
-from ...scene.alignment import Solution
+from ...scene.footage import alignment, camera_paths, pairs, videos
+from ...scene.footage.alignment import Solution
+from ...scene.storage import store
+from ...scene.terrain import georeference
 
 
 def solve(scene: bpy.types.Scene, camera: bpy.types.Object) -> bool:

@@ -4,7 +4,7 @@
 import bpy
 from bpy.props import IntProperty, StringProperty
 
-from ...scene import databases
+from ...scene.storage import databases
 from ...view.from_file import FromFile
 from ...view.panel import Rows
 from ...view.reporting import possible, reported

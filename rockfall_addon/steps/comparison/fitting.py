@@ -8,7 +8,8 @@ from ....core.analysis.calibration import calibrate
 from ....core.analysis.equivalence import equivalent
 from ....core.impact_models.registry import MODELS
 from ....core.progress import Progress
-from ...scene import comparison, fit, store
+from ...scene.models import comparison, fit
+from ...scene.storage import store
 from ...view import job
 from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported

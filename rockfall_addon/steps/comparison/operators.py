@@ -7,7 +7,8 @@ from bpy_extras.io_utils import ExportHelper
 
 from ....core.exchange.parameters import write_parameters
 from ....core.impact_models.registry import MODELS, find_model
-from ...scene import model_parameters, models, store
+from ...scene.models import model_parameters, models
+from ...scene.storage import store
 from ...view.parameters import OfModel
 from ...view.reporting import possible, reported
 from ...view.to_file import asked_file

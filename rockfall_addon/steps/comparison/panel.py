@@ -7,7 +7,8 @@ import bpy
 
 from ....core.analysis.variables import find_variable
 from ....core.impact_models.registry import MODELS
-from ...scene import comparison, comparison_scores, databases, fit, model_parameters, models, store
+from ...scene.models import comparison, comparison_scores, fit, model_parameters, models
+from ...scene.storage import databases, store
 from ...view import job, parameters
 from ...view.graphs.panel import GraphPanel
 from ...view.panel import paragraph, show_remarks

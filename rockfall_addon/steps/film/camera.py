@@ -14,7 +14,8 @@ from ....core.film.framing import Margins, Seen, View, downhill_direction, look_
 from ....core.terrain.raycast import any_hit
 from ....core.terrain.surface import Surface
 from ....core.vectors import Array, norm
-from ...scene import georeference, store, terrain
+from ...scene.storage import store
+from ...scene.terrain import georeference, terrain
 from .motions import Motion
 
 FRAMED_POINTS, WATCHED_POINTS = 2000, 160

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ....core.vectors import Array
-from ...scene import materials
+from ...scene.storage import materials
 
 VALUE_ATTRIBUTE, COLOUR_ATTRIBUTE = "caption_value", "colour"
 WHITE, BRIGHT_GREY, GREY = (0.95, 0.96, 0.97), (0.84, 0.87, 0.90), (0.66, 0.71, 0.76)

@@ -13,8 +13,10 @@ from ....core.film.composed.kinds import CODECS, KINDS, find_kind
 from ....core.film.composed.request import FilmRequest
 from ....core.film.presets import BUILT_IN
 from ....core.progress import Progress
-from ...scene import camera_paths, models, store, videos
 from ...scene.film_preset import preset_of
+from ...scene.footage import camera_paths, videos
+from ...scene.models import models
+from ...scene.storage import store
 from ...view import job
 from ...view.job import InBackground, Work
 from ...view.panel import RockfallPanel, fields, paragraph

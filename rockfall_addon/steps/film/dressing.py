@@ -13,7 +13,11 @@ from ....core.film.presets import FilmTiming
 from ....core.film.simulated import Group, LegendEntry, last_moment, legend
 from ....core.film.wording import compared_lines, fastest_speed, notes, simulated_lines
 from ....core.impact_models.registry import find_model
-from ...scene import models, simulation, store, timing, trails
+from ...scene.footage import timing
+from ...scene.models import models
+from ...scene.picks import trails
+from ...scene.simulation import simulation
+from ...scene.storage import store
 from . import camera, layout, marks, presence, remembered, simulated
 from . import graphs as film_graphs
 from .engine import use_engine

@@ -5,7 +5,7 @@ import bpy
 import gpu
 
 from ....core.film.engines import IDENTIFIERS
-from ...scene import materials
+from ...scene.storage import materials
 
 FILM_SAMPLES, PICTURE_SAMPLES = 4, 24
 """Per pixel, and only to smooth edges: nothing here is noisy."""

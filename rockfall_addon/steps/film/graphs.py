@@ -21,7 +21,10 @@ from ....core.film import graphs as film_graphs
 from ....core.film.graphs import FilmGraphs
 from ....core.film.job import GraphKind
 from ....core.vectors import Array
-from ...scene import graph_settings, keyframes, materials, models, reconstruction, timing
+from ...scene.footage import timing
+from ...scene.models import graph_settings, models
+from ...scene.picks import keyframes, reconstruction
+from ...scene.storage import materials
 from . import captions
 from .marks import until_now_group
 

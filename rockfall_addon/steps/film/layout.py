@@ -11,7 +11,7 @@ import numpy as np
 from ....core.colours import SPEED_SCALE, scale_colours, srgb_to_linear
 from ....core.film.simulated import LegendEntry
 from ....core.vectors import Array
-from ...scene import materials
+from ...scene.storage import materials
 from . import captions
 
 EDGE = 0.055

@@ -4,7 +4,8 @@
 import bpy
 import numpy as np
 
-from ...scene import materials, store, timing
+from ...scene.footage import timing
+from ...scene.storage import materials, store
 from . import captions
 
 GROUP = "Rockfall impact marks"

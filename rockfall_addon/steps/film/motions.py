@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ....core.vectors import Array
-from ...scene import materials, store
+from ...scene.storage import materials, store
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,8 @@ import bpy
 
 from ....core.errors import RockfallError
 from ....core.progress import Progress
-from ...scene import store
 from ...scene.film_preset import preset_of
+from ...scene.storage import store
 from ...view import job, workspace
 from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...scene import store, timing
+from ...scene.footage import timing
+from ...scene.storage import store
 from .motions import Motion
 
 LINGER_S = 0.4

@@ -9,7 +9,7 @@ from bpy.props import EnumProperty, FloatProperty, StringProperty
 from ....core.film.files import NAME, SUFFIX, film_file
 from ....core.film.job import GraphKind
 from ....core.film.presets import BUILT_IN
-from ...scene import store
+from ...scene.storage import store
 from ...view.from_file import last_folder
 
 

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import store
+from ...scene.storage import store
 
 SETTINGS = (
     "render.engine", "render.resolution_x", "render.resolution_y", "render.resolution_percentage",

@@ -18,8 +18,10 @@ from ....core.reconstruction.trajectory import Reconstruction
 from ....core.simulation.measured_releases import start_times
 from ....core.workflow.opening import camera_remarks
 from ....core.workflow.simulation import remarks_of
-from ...scene import models, problems, simulation
+from ...scene import problems
+from ...scene.models import models
 from ...scene.project import load_project
+from ...scene.simulation import simulation
 from . import dressing, encoding, saved
 from .engine import engine_of, use_engine
 from .quicker import use_quicker
@@ -157,7 +159,7 @@ def _simulate(
 def _show_terrain(scene: bpy.types.Scene, job: FilmJob) -> None:
     from ....core.terrain.readers import read_terrain
     from ....core.terrain.shading import shade, thin_share
-    from ...scene.terrain import add_terrain
+    from ...scene.terrain.terrain import add_terrain
 
     surface = read_terrain(job.source, up=job.up, unit_m=job.unit_m)
     shading = shade(surface)

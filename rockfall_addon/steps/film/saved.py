@@ -5,9 +5,9 @@ import bpy
 
 from ....core.errors import InputError
 from ....core.film.job import AS_SET_UP, FilmJob
-from ...scene import store
 from ...scene.film_preset import preset_of
-from ...scene.saved import open_saved
+from ...scene.storage import store
+from ...scene.storage.saved import open_saved
 from . import dressing, remembered, up_to_date
 from .engine import engine_of, quickest_engine
 from .properties import graphs_of

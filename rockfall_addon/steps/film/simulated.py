@@ -10,7 +10,9 @@ from ....core.film.simulated import Group, group_name, path_opacity
 from ....core.impact_models.registry import find_model
 from ....core.simulation.engine import ENDS, LEFT_TERRAIN, STOPPED
 from ....core.vectors import Array
-from ...scene import materials, simulated_paths, simulation, store, trails
+from ...scene.picks import trails
+from ...scene.simulation import simulated_paths, simulation
+from ...scene.storage import materials, store
 from . import presence
 from .motions import Motion
 

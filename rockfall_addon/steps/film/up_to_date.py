@@ -6,7 +6,7 @@ import json
 
 import bpy
 
-from ...scene import store
+from ...scene.storage import store
 from . import remembered
 
 SETTINGS = (

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import graph_settings
+from ...scene.models import graph_settings
 from ...view.graphs import editor, impact_sheet, selection
 from . import menus
 

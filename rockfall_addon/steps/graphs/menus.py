@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import graph_settings
+from ...scene.models import graph_settings
 
 
 class ROCKFALL_MT_graphs_view(bpy.types.Menu):

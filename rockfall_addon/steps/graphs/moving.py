@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import bpy
 from bpy.props import BoolProperty, IntProperty
 
-from ...scene import graph_settings
+from ...scene.models import graph_settings
 from ...view.graphs import editor, impact_sheet
 from ...view.reporting import redraw
 

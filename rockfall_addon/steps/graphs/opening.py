@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...scene import problems, store
+from ...scene import problems
+from ...scene.storage import store
 from ...view import look, workspace
 from ...view.graphs import areas, editor
 from ...view.reporting import InWindow, reported

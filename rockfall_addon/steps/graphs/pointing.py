@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty
 
-from ...scene import graph_settings
+from ...scene.models import graph_settings
 from ...view.graphs import editor, impact_sheet, selection
 from ...view.reporting import redraw
 

@@ -6,7 +6,7 @@ from bpy.props import IntProperty, StringProperty
 
 from ....core.analysis.columns import column_titles, find_column
 from ....core.errors import RockfallError
-from ...scene import comparison
+from ...scene.models import comparison
 from ...view.reporting import reported
 
 

@@ -9,7 +9,8 @@ from ....core.analysis.group_statistics import group_statistics
 from ....core.analysis.statistics_words import class_rows, group_cells, summary_rows
 from ....core.errors import RockfallError
 from ....core.progress import Progress
-from ...scene import graph_settings, statistics
+from ...scene.models import graph_settings
+from ...scene.picks import statistics
 from ...view import job
 from ...view.graphs.panel import GraphPanel
 from ...view.job import InBackground, Work

@@ -5,7 +5,9 @@ import bpy
 from bpy.props import FloatProperty, StringProperty
 
 from ....core.errors import RockfallError
-from ...scene import impact_rows, store, sync
+from ...scene.footage import sync
+from ...scene.picks import impact_rows
+from ...scene.storage import store
 from ...view.reporting import possible, reported
 
 WIDE = 760  # pixels at interface scale 1

@@ -7,7 +7,9 @@ import gpu
 import numpy as np
 
 from ....core.analysis.graph_layout import Rectangle
-from ...scene import picks, problems, store
+from ...scene import problems
+from ...scene.picks import picks
+from ...scene.storage import store
 from ...view import impact_words, pointing
 from ...view.graphs import drawing
 from ...view.graphs.look import Look, look

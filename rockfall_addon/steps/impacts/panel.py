@@ -5,7 +5,8 @@ import math
 
 import bpy
 
-from ...scene import impact_numbers, picks, spins, store
+from ...scene.picks import impact_numbers, picks, spins
+from ...scene.storage import store
 from ...view import impact_words, pointing
 from ...view.panel import RockfallPanel, facts, field, fields, paragraph
 

@@ -8,13 +8,13 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ....core.reconstruction.picks import KINDS, STATUSES
-from ...scene import store
+from ...scene.storage import store
 
 CONFIDENCES = ("", "1", "2", "3")
 
 
 def _edited(pick: bpy.types.PropertyGroup, field: str) -> None:
-    from ...scene import sync
+    from ...scene.footage import sync
 
     for scene in pick.id_data.users_scene:
         sync.touch(scene, field=pick.bl_rna.properties[field].name)
@@ -26,7 +26,7 @@ def _get_kind(self: bpy.types.PropertyGroup) -> int:
 
 
 def _set_kind(self: bpy.types.PropertyGroup, value: int) -> None:
-    from ...scene import pick_names
+    from ...scene.picks import pick_names
 
     self.id_data[store.KIND] = KINDS[value]
     pick_names.follow_with(self.id_data)
@@ -44,27 +44,27 @@ def _set_status(self: bpy.types.PropertyGroup, value: int) -> None:
 
 
 def _get_confidence(self: bpy.types.PropertyGroup) -> int:
-    from ...scene import picks
+    from ...scene.picks import picks
 
     text = picks.extra_of(self.id_data, "confidence")
     return CONFIDENCES.index(text) if text in CONFIDENCES else 0
 
 
 def _set_confidence(self: bpy.types.PropertyGroup, value: int) -> None:
-    from ...scene import picks
+    from ...scene.picks import picks
 
     picks.set_extra(self.id_data, "confidence", CONFIDENCES[value])
     _edited(self, "confidence")
 
 
 def _get_note(self: bpy.types.PropertyGroup) -> str:
-    from ...scene import picks
+    from ...scene.picks import picks
 
     return picks.extra_of(self.id_data, "note")
 
 
 def _set_note(self: bpy.types.PropertyGroup, value: str) -> None:
-    from ...scene import picks
+    from ...scene.picks import picks
 
     picks.set_extra(self.id_data, "note", value)
 
@@ -76,7 +76,8 @@ def _get_time(self: bpy.types.PropertyGroup) -> str:
 
 
 def _set_time(self: bpy.types.PropertyGroup, value: str) -> None:
-    from ...scene import pick_names, sync
+    from ...scene.footage import sync
+    from ...scene.picks import pick_names
 
     if value.strip() != _get_time(self):
         sync.retime(self.id_data, value)

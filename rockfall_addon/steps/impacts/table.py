@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import bpy
 
-from ...scene import impact_marks, impact_rows, store
+from ...scene.picks import impact_marks, impact_rows
+from ...scene.storage import store
 from ...view import impact_words
 from ...view.panel import RockfallPanel, Rows, paragraph
 

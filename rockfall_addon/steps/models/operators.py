@@ -8,7 +8,9 @@ from bpy.props import EnumProperty, StringProperty
 from ....core.analysis.predicted_flights import score_landings
 from ....core.exchange.parameters import read_parameters
 from ....core.impact_models.registry import MODELS
-from ...scene import models, reconstruction, store
+from ...scene.models import models
+from ...scene.picks import reconstruction
+from ...scene.storage import store
 from ...view.from_file import FromFile
 from ...view.reporting import reported
 

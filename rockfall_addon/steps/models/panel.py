@@ -4,7 +4,8 @@
 import bpy
 
 from ....core.impact_models.registry import MODELS
-from ...scene import models, store
+from ...scene.models import models
+from ...scene.storage import store
 from ...view import parameters
 from ...view.panel import RockfallPanel, State, paragraph
 

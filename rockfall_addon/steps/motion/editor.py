@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import motion
+from ...scene.models import motion
 from ...view.graphs import editor, motion_sheet
 
 

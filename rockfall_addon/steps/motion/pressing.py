@@ -5,7 +5,9 @@ from math import floor, hypot
 
 import bpy
 
-from ...scene import impact_rows, store, timing
+from ...scene.footage import timing
+from ...scene.picks import impact_rows
+from ...scene.storage import store
 from ...view.graphs import editor, motion_sheet
 from ...view.reporting import redraw
 

@@ -8,8 +8,10 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty
 
 from ....core.reconstruction.block import SHAPES, Block
-from ...scene import impact_rows, own_blocks, places, store, sync
-from ...scene.settings import BLOCK_SHAPES, DENSITIES, DIAMETERS
+from ...scene.footage import sync
+from ...scene.picks import impact_rows, own_blocks, places
+from ...scene.storage import store
+from ...scene.storage.settings import BLOCK_SHAPES, DENSITIES, DIAMETERS
 from ...view.panel import RockfallPanel, facts, fields, kilograms, paragraph
 
 

@@ -7,8 +7,11 @@ import numpy as np
 from ....core.errors import RockfallError
 from ....core.reconstruction.triangulation import GRAZING_DEG
 from ....core.workflow.first_picks import brought_to_terrain, coordinate_sigma
-from ...scene import clicks, pick_names, picks, pictures, places, reconstruction, store, sync, terrain, timing, videos
-from ...scene.places import Place
+from ...scene.footage import clicks, pictures, sync, timing, videos
+from ...scene.picks import pick_names, picks, places, reconstruction
+from ...scene.picks.places import Place
+from ...scene.storage import store
+from ...scene.terrain import terrain
 
 _VECTORS = (store.POSITION, store.NORMAL, store.SIGMA_POSITION, store.SIGMA_TIME)
 

@@ -5,8 +5,10 @@ import bpy
 from bpy.props import EnumProperty
 
 from ....core.errors import RockfallError
-from ...scene import clicks, picks, pictures, places, sightings, store
-from ...scene.trajectories import flights_of
+from ...scene.footage import clicks, pictures, sightings
+from ...scene.picks import picks, places
+from ...scene.picks.trajectories import flights_of
+from ...scene.storage import store
 from ...view import look, pointing, tool_header
 from ...view.reporting import possible, reported
 from . import editing

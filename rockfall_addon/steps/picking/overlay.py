@@ -7,7 +7,10 @@ import gpu
 import numpy as np
 
 from ....core.errors import visible
-from ...scene import clicks, picks, places, problems, proposal, store, videos
+from ...scene import problems
+from ...scene.footage import clicks, videos
+from ...scene.picks import picks, places, proposal
+from ...scene.storage import store
 from ...view import drawing, footage_view, image_view, pointing
 from ...view.drawn import Drawing, Mark
 

@@ -3,7 +3,10 @@
 
 import bpy
 
-from ...scene import camera_paths, places, problems, sightings, store, videos
+from ...scene import problems
+from ...scene.footage import camera_paths, sightings, videos
+from ...scene.picks import places
+from ...scene.storage import store
 from ...view import job, pointing
 from ...view.panel import RockfallPanel, State, advise, fields, is_grave, paragraph, show_remarks
 from . import editing, set_aside

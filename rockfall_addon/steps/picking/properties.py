@@ -15,7 +15,7 @@ KINDS = (
 
 
 def _names(self: bpy.types.PropertyGroup, context: bpy.types.Context, text: str) -> list[str]:
-    from ...scene import places
+    from ...scene.picks import places
 
     return places.trajectories(self.id_data)
 

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...scene import recovery, set_aside, store, sync
+from ...scene.footage import sync
+from ...scene.storage import recovery, set_aside, store
 from ...view.reporting import possible, reported
 
 NOTHING = "Nothing is set aside"

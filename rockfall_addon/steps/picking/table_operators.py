@@ -12,7 +12,11 @@ from ....core.progress import Progress, silent
 from ....core.reconstruction.picks import Picks
 from ....core.reconstruction.trajectory import Reconstruction
 from ....core.workflow.uprightness import turned_picks
-from ...scene import georeference, problems, reconstruction, store, sync
+from ...scene import problems
+from ...scene.footage import sync
+from ...scene.picks import reconstruction
+from ...scene.storage import store
+from ...scene.terrain import georeference
 from ...view import job, look
 from ...view.from_file import FromFile
 from ...view.reporting import possible, reported

@@ -6,8 +6,10 @@ import bpy
 from ....core.errors import RockfallError
 from ....core.progress import Progress
 from ....core.workflow.tracking import FollowedBlock, follow_block
-from ...scene import alignment, camera_paths, clocks, places, sightings, store, video_files, videos
-from ...scene.trajectories import flights_of
+from ...scene.footage import alignment, camera_paths, clocks, sightings, video_files, videos
+from ...scene.picks import places
+from ...scene.picks.trajectories import flights_of
+from ...scene.storage import store
 from ...view import job, look
 from ...view.of_video import has_video
 from ...view.reporting import possible, reported

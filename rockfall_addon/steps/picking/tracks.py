@@ -6,7 +6,9 @@ import bpy
 from ....core.errors import RockfallError
 from ....core.footage.kinks import SHORTEST
 from ....core.workflow.first_picks import first_picks
-from ...scene import clicks, picks, places, reconstruction, sightings, store, sync
+from ...scene.footage import clicks, sightings, sync
+from ...scene.picks import picks, places, reconstruction
+from ...scene.storage import store
 
 NOTE = "proposed from the track"
 

@@ -5,7 +5,10 @@ import bpy
 
 from ....core.colours import MEASURED_COLOUR
 from ....core.impact_models.registry import MODELS
-from ...scene import models, problems, store, trails
+from ...scene import problems
+from ...scene.models import models
+from ...scene.picks import trails
+from ...scene.storage import store
 from ...view import legend
 
 _handles: list[object] = []

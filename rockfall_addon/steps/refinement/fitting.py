@@ -12,7 +12,10 @@ from ....core.errors import RockfallError
 from ....core.progress import Progress
 from ....core.workflow.opening import drag_of
 from ....core.workflow.refinement import Refined, refine_picks
-from ...scene import camera_paths, picks, proposal, reconstruction, sightings, store, sync, terrain, videos
+from ...scene.footage import camera_paths, sightings, sync, videos
+from ...scene.picks import picks, proposal, reconstruction
+from ...scene.storage import store
+from ...scene.terrain import terrain
 from ...view import job
 
 

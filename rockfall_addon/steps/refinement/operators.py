@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...scene import places, proposal, store
+from ...scene.picks import places, proposal
+from ...scene.storage import store
 from ...view import job, pointing
 from ...view.reporting import possible, reported
 from . import fitting

@@ -3,8 +3,8 @@
 
 import bpy
 
-from ...scene import proposal
-from ...scene.proposal import Proposal
+from ...scene.picks import proposal
+from ...scene.picks.proposal import Proposal
 from ...view import job
 from ...view.panel import RockfallPanel, State, advise, facts, is_grave, numbers, paragraph, show_remarks
 

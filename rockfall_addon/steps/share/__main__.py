@@ -59,7 +59,7 @@ def _save_project(blend: Path, folder: Path) -> list[str]:
         bpy.ops.wm.read_factory_settings(use_empty=True)
         rockfall_addon.register()
     from ...scene import project
-    from ...scene.saved import open_saved
+    from ...scene.storage.saved import open_saved
 
     try:
         _, left_out = project.save_project(open_saved(blend), folder)

@@ -7,7 +7,7 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ....core.output import output_folder
-from ...scene import store
+from ...scene.storage import store
 from ...view.graphs import editor, export
 from ...view.reporting import possible, reported
 from ...view.to_file import asked_file

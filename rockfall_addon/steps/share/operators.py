@@ -12,7 +12,11 @@ from ....core.output import output_folder
 from ....core.progress import Progress
 from ....core.reconstruction.sampling import sample_trajectories
 from ....core.remarks import Remark
-from ...scene import design_sheet, project, reconstruction, simulation, simulation_setup, spins, store, terrain, trails
+from ...scene import project
+from ...scene.picks import reconstruction, spins, trails
+from ...scene.simulation import design_sheet, simulation, simulation_setup
+from ...scene.storage import store
+from ...scene.terrain import terrain
 from ...view import job
 from ...view.job import InBackground, Work
 from ...view.reporting import possible, reported

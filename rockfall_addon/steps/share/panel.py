@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import store
+from ...scene.storage import store
 from ...view import job
 from ...view.panel import RockfallPanel, State, paragraph
 

@@ -12,7 +12,7 @@ from ....core.outreach.animation import FORMATS, RATE, animate
 from ....core.outreach.animator import write_animation
 from ....core.outreach.page import make_page, page_texts
 from ....core.progress import Progress
-from ...scene import shown
+from ...scene.picks import shown
 from ...view import job
 from ...view.from_file import last_folder
 from ...view.job import InBackground, Work

@@ -10,7 +10,10 @@ from ....core.impact_models.registry import MODELS
 from ....core.progress import Progress
 from ....core.simulation.parameter_draws import FRICTION_NAME
 from ....core.workflow.back_analysis import ROUNDS, SETS
-from ...scene import back_analysis, model_parameters, posterior, screens, store, terrain
+from ...scene.models import model_parameters
+from ...scene.simulation import back_analysis, posterior, screens
+from ...scene.storage import store
+from ...scene.terrain import terrain
 from ...view import job
 from ...view.job import InBackground, Work
 from ...view.panel import RockfallPanel, numbers, paragraph, show_remarks

@@ -7,7 +7,9 @@ from bpy.props import EnumProperty
 
 from ....core.errors import RockfallError
 from ....core.vectors import Array
-from ...scene import drawn_releases, problems, terrain
+from ...scene import problems
+from ...scene.simulation import drawn_releases
+from ...scene.terrain import terrain
 from ...view import drawing, pointing
 from ...view.reporting import possible, redraw
 

@@ -16,7 +16,7 @@ from ....core.hazard.face_tally import AT_CONTACT, FACE_LAYERS, FaceMaps
 from ....core.hazard.maps import CLASSES_KJ, QUANTITIES, SHARES
 from ....core.terrain.raycast import cast_ray
 from ....core.terrain.surface import Surface
-from ...scene import hazard_maps
+from ...scene.simulation import hazard_maps
 
 SHADE = 0.55
 """Part of a colour that the light decides: so faces are told apart."""

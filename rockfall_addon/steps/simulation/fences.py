@@ -8,7 +8,9 @@ from gpu_extras.batch import batch_for_shader
 
 from ....core.errors import RockfallError
 from ....core.vectors import Array
-from ...scene import fingerprints, problems, screens, simulation_setup, store
+from ...scene import problems
+from ...scene.simulation import screens, simulation_setup
+from ...scene.storage import fingerprints, store
 
 MEASURES, HOLDS = (0.88, 0.89, 0.92), (1.0, 0.36, 0.78)
 """Colours of a screen, and of a barrier of which nothing is known; no model has them."""

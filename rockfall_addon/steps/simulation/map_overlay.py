@@ -14,7 +14,10 @@ from ....core.hazard.evidence import face_evidence
 from ....core.hazard.face_tally import FACE_LAYERS
 from ....core.hazard.maps import LAYERS, Maps
 from ....core.impact_models.registry import MODELS
-from ...scene import hazard_maps, problems, simulation, store, terrain, terrain_mesh
+from ...scene import problems
+from ...scene.simulation import hazard_maps, simulation
+from ...scene.storage import store
+from ...scene.terrain import terrain, terrain_mesh
 from ...view import legend
 from . import face_overlay
 

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...scene import hazard_maps, simulation_setup, store
+from ...scene.simulation import hazard_maps, simulation_setup
+from ...scene.storage import store
 from ...view import job
 from ...view.panel import RockfallPanel, advise, paragraph, show_remarks
 

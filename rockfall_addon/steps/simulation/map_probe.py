@@ -13,7 +13,8 @@ from ....core.errors import RockfallError
 from ....core.hazard.evidence import FEW
 from ....core.hazard.maps import CLASSES_KJ, QUANTITIES, SHARES, Maps
 from ....core.terrain.raycast import cast_ray
-from ...scene import hazard_maps, problems, simulation_setup
+from ...scene import problems
+from ...scene.simulation import hazard_maps, simulation_setup
 from ...view import legend
 from . import face_overlay, map_overlay
 

@@ -10,7 +10,9 @@ from ....core.impact_models.registry import find_model
 from ....core.output import output_folder
 from ....core.progress import Progress
 from ....core.workflow.simulation_output import WITH_BARRIERS
-from ...scene import georeference, hazard_maps, simulation_setup, store
+from ...scene.simulation import hazard_maps, simulation_setup
+from ...scene.storage import store
+from ...scene.terrain import georeference
 from ...view import job
 from ...view.job import InBackground, Work
 from ...view.reporting import possible

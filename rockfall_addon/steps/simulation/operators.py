@@ -5,7 +5,8 @@ import bpy
 
 from ....core.impact_models.registry import find_model
 from ....core.progress import Progress
-from ...scene import simulated_sources, simulation, simulation_setup, store
+from ...scene.simulation import simulated_sources, simulation, simulation_setup
+from ...scene.storage import store
 from ...view import job, look
 from ...view.job import InBackground, Work
 from ...view.parameters import OfModel

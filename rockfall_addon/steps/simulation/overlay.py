@@ -9,7 +9,9 @@ from gpu_extras.batch import batch_for_shader
 
 from ....core.colours import MEASURED_COLOUR
 from ....core.impact_models.registry import MODELS
-from ...scene import problems, simulated_paths, simulation, store
+from ...scene import problems
+from ...scene.simulation import simulated_paths, simulation
+from ...scene.storage import store
 from ...view import legend
 
 WIDTH_PX, SELECTED_PX = 1.4, 4.0

@@ -4,7 +4,10 @@
 import bpy
 
 from ....core.impact_models.registry import MODELS
-from ...scene import models, screens, simulated_sources, simulation, simulation_setup, store, structures, terrain
+from ...scene.models import models
+from ...scene.simulation import screens, simulated_sources, simulation, simulation_setup, structures
+from ...scene.storage import store
+from ...scene.terrain import terrain
 from ...view import job, parameters
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph, show_remarks
 

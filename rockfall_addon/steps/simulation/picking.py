@@ -6,7 +6,7 @@ import numpy as np
 from bpy.props import IntProperty
 
 from ....core.vectors import Array
-from ...scene import simulated_paths, simulation
+from ...scene.simulation import simulated_paths, simulation
 from ...view import pointing
 from ...view.reporting import possible, redraw, reported
 

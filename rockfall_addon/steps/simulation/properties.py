@@ -20,8 +20,10 @@ from ....core.hazard.maps import LAYERS
 from ....core.simulation.block_shapes import SHAPES
 from ....core.simulation.engine import FRICTION
 from ....core.simulation.trees import HEIGHT_M, KIND, SPECIES
-from ...scene import drawn_releases, models, simulation, store
-from ...scene.settings import DENSITIES, DIAMETERS
+from ...scene.models import models
+from ...scene.simulation import drawn_releases, simulation
+from ...scene.storage import store
+from ...scene.storage.settings import DENSITIES, DIAMETERS
 from ...view.reporting import redraw
 
 

@@ -4,7 +4,8 @@
 import bpy
 
 from ....core.errors import RockfallError
-from ...scene import screens, store
+from ...scene.simulation import screens
+from ...scene.storage import store
 from ...view.reporting import reported
 from .drawing import Drawing
 

@@ -4,7 +4,7 @@
 import bpy
 
 from ....core.errors import RockfallError
-from ...scene import structures
+from ...scene.simulation import structures
 from ...view.reporting import possible, reported
 
 

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import terrain
+from ...scene.terrain import terrain
 from ...view.reporting import possible, reported
 
 

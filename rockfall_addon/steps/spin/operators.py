@@ -8,8 +8,10 @@ from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ....core.errors import RockfallError
 from ....core.reconstruction.spin_marks import AXES, AXIS_WORDS
-from ...scene import camera_paths, clocks, pictures, places, spins, store, sync, videos
-from ...scene.spins import Measured
+from ...scene.footage import camera_paths, clocks, pictures, sync, videos
+from ...scene.picks import places, spins
+from ...scene.picks.spins import Measured
+from ...scene.storage import store
 from ...view import pointing, tool_header
 from ...view.reporting import possible, reported
 

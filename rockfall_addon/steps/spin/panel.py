@@ -4,8 +4,10 @@
 import bpy
 
 from ....core.reconstruction.spin_marks import AXIS_WORDS
-from ...scene import places, spins, store, videos
-from ...scene.spins import Measured
+from ...scene.footage import videos
+from ...scene.picks import places, spins
+from ...scene.picks.spins import Measured
+from ...scene.storage import store
 from ...view.panel import RockfallPanel, advise, facts, field, paragraph
 from .operators import AXIS_NAMES, SpinTool
 

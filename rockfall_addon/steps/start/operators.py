@@ -6,8 +6,9 @@ from pathlib import Path
 import bpy
 from bpy.props import StringProperty
 
-from ...scene import clocks, footage_blend, sightings, start_up, store, videos
 from ...scene import project as scene_project
+from ...scene.footage import clocks, footage_blend, sightings, videos
+from ...scene.storage import start_up, store
 from ...view import arranging, look
 from ...view.from_file import FromFile
 from ...view.reporting import possible, reported

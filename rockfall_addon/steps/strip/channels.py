@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...scene import store
+from ...scene.storage import store
 from ...view.reporting import possible, reported
 
 

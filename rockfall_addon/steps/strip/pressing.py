@@ -6,7 +6,9 @@ from math import floor
 import bpy
 import numpy as np
 
-from ...scene import impact_rows, pick_names, picks, store, sync, timing
+from ...scene.footage import sync, timing
+from ...scene.picks import impact_rows, pick_names, picks
+from ...scene.storage import store
 from ...view import strip
 from ...view.reporting import redraw
 

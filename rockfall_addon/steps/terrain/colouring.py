@@ -8,7 +8,8 @@ from ....core.errors import RockfallError
 from ....core.film.composed.photographs import photographed
 from ....core.outreach.photographs import photographs_of
 from ....core.progress import Progress
-from ...scene import materials, store, terrain, terrain_colours, terrain_look
+from ...scene.storage import materials, store
+from ...scene.terrain import terrain, terrain_colours, terrain_look
 from ...view import job
 from ...view.reporting import possible
 

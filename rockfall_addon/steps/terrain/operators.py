@@ -16,19 +16,10 @@ from ....core.terrain.opening import EXTENSIONS
 from ....core.terrain.readers import TerrainInfo, inspect_terrain, read_terrain
 from ....core.terrain.shading import Shading, shade
 from ....core.terrain.surface import Surface
-from ...scene import (
-    camera_paths,
-    georeference,
-    materials,
-    pairs,
-    start_up,
-    store,
-    sync,
-    terrain,
-    terrain_look,
-    videos,
-)
+from ...scene.footage import camera_paths, pairs, sync, videos
 from ...scene.next_step import MILLIMETRE_M
+from ...scene.storage import materials, start_up, store
+from ...scene.terrain import georeference, terrain, terrain_look
 from ...view import job, look
 from ...view.first_import import FirstImport, begin_file
 from ...view.reporting import possible, reported

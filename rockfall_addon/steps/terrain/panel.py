@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...scene import georeference, materials, store, terrain, terrain_colours, terrain_view
+from ...scene.storage import materials, store
+from ...scene.terrain import georeference, terrain, terrain_colours, terrain_view
 from ...view import job
 from ...view.panel import RockfallPanel, State, advise, facts, paragraph
 

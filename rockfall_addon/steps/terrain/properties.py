@@ -4,17 +4,17 @@
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
-from ...scene.materials import TERRAIN_VALUES
+from ...scene.storage.materials import TERRAIN_VALUES
 
 
 def _look_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    from ...scene import terrain_look
+    from ...scene.terrain import terrain_look
 
     terrain_look.apply(self.id_data)
 
 
 def _view_changed(self: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    from ...scene import terrain_view
+    from ...scene.terrain import terrain_view
 
     terrain_view.follow(self.id_data)
 

@@ -5,7 +5,10 @@ import bpy
 from bpy.props import StringProperty
 
 from ....core.errors import RockfallError
-from ...scene import pairs, picks, store, sync, terrain, videos
+from ...scene.footage import pairs, sync, videos
+from ...scene.picks import picks
+from ...scene.storage import store
+from ...scene.terrain import terrain
 from ...view.reporting import possible, reported
 
 

@@ -11,7 +11,8 @@ from mathutils import Matrix
 from ....core.errors import RockfallError
 from ....core.footage.background import glance
 from ....core.footage.sequences import PICTURES, sequence_beside
-from ...scene import alignment, clocks, footage, new_videos, start_up, store, video_files, video_times, videos
+from ...scene.footage import alignment, clocks, footage, new_videos, video_files, video_times, videos
+from ...scene.storage import start_up, store
 from ...view import workspace
 from ...view.first_import import FirstImport, begin_file
 from ...view.from_file import FromFile, remember_folder

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ...scene import camera_paths, store, video_times, videos
+from ...scene.footage import camera_paths, video_times, videos
+from ...scene.storage import store
 from ...view import image_view
 from ...view.panel import RockfallPanel, State, advise, facts, fields, paragraph, show_remarks
 from . import proxies, wording

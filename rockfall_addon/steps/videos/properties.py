@@ -4,13 +4,13 @@
 import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty
 
-from ...scene import store
+from ...scene.storage import store
 
 MICRO = 1e-6
 
 
 def _is_video(obj: bpy.types.Object) -> bool:
-    from ...scene import videos
+    from ...scene.footage import videos
 
     return videos.is_video(obj)
 
@@ -19,14 +19,14 @@ def _clock(name: str, unit: float = 1.0) -> dict:
     """Getter and setter of a number of the clock, shown in a unit."""
 
     def get(self: bpy.types.PropertyGroup) -> float:
-        from ...scene import clocks
+        from ...scene.footage import clocks
 
         return getattr(clocks.clock_of(self.id_data), name) / unit if _is_video(self.id_data) else 0.0
 
     def put(self: bpy.types.PropertyGroup, value: float) -> None:
         from dataclasses import replace
 
-        from ...scene import clocks
+        from ...scene.footage import clocks
 
         if _is_video(self.id_data):
             clock = replace(clocks.clock_of(self.id_data), **{name: store.double(value) * unit})
@@ -37,13 +37,13 @@ def _clock(name: str, unit: float = 1.0) -> dict:
 
 
 def _get_capture(self: bpy.types.PropertyGroup) -> float:
-    from ...scene import videos
+    from ...scene.footage import videos
 
     return (videos.capture_rate_of(self.id_data) if _is_video(self.id_data) else None) or 0.0
 
 
 def _set_capture(self: bpy.types.PropertyGroup, value: float) -> None:
-    from ...scene import clocks
+    from ...scene.footage import clocks
 
     if _is_video(self.id_data):
         clocks.set_capture_rate(self.id_data, store.double(value) or None)
@@ -51,7 +51,7 @@ def _set_capture(self: bpy.types.PropertyGroup, value: float) -> None:
 
 
 def _get_row_time(self: bpy.types.PropertyGroup) -> float:
-    from ...scene import videos
+    from ...scene.footage import videos
 
     known = videos.row_time_of(self.id_data) if _is_video(self.id_data) else None
     return -1.0 if known is None else known / MICRO
@@ -65,7 +65,7 @@ def _set_row_time(self: bpy.types.PropertyGroup, value: float) -> None:
 
 
 def _changed(camera: bpy.types.Object) -> None:
-    from ...scene import video_times
+    from ...scene.footage import video_times
 
     for scene in camera.users_scene:
         video_times.clock_changed(scene, camera)

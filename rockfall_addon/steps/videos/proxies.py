@@ -4,7 +4,7 @@
 import bpy
 
 from ....core.errors import RockfallError
-from ...scene import video_files
+from ...scene.footage import video_files
 
 SIZES = (25, 50)
 

@@ -5,7 +5,9 @@ import bpy
 
 from ....core.footage.sequences import is_there
 from ....core.remarks import Remark, from_plain, from_text
-from ...scene import camera_paths, clocks, footage, proposal, store, timing, video_files, video_times, videos
+from ...scene.footage import camera_paths, clocks, footage, timing, video_files, video_times, videos
+from ...scene.picks import proposal
+from ...scene.storage import store
 from ...view import image_view
 
 OTHER_RATE = 1e-4

@@ -9,8 +9,9 @@ import numpy as np
 from ....core.analysis.graph_layout import Rectangle
 from ....core.analysis.variables import VARIABLES
 from ....core.vectors import Mask
-from ...scene import next_step, store
-from ...scene.comparison import SceneComparison
+from ...scene import next_step
+from ...scene.models.comparison import SceneComparison
+from ...scene.storage import store
 from ..wrapping import broken
 from . import drawing
 from .editor import Canvas, button

@@ -16,7 +16,8 @@ from ....core.exchange.graph_tables import GraphPoints, write_graph_points
 from ....core.exchange.motion_tables import write_motion
 from ....core.opencv import write_picture
 from ....core.output import write_text
-from ...scene import clocks, comparison, graph_settings, timing, videos
+from ...scene.footage import clocks, timing, videos
+from ...scene.models import comparison, graph_settings
 from . import drawing, editor, impact_sheet, motion_sheet
 from .editor import Canvas
 from .look import Look, dressed, look

@@ -28,8 +28,8 @@ from ....core.analysis.variable_sigma import measured_interval
 from ....core.analysis.variables import VARIABLES
 from ....core.impact_models.registry import MODELS
 from ....core.vectors import Array, Mask
-from ...scene import graph_settings
-from ...scene.comparison import SceneComparison
+from ...scene.models import graph_settings
+from ...scene.models.comparison import SceneComparison
 from .drawing import Lines, Points
 from .look import Look, Rgb, mixed, readable
 from .point_colours import PointColours

@@ -17,7 +17,7 @@ from ....core.analysis.variables import VARIABLES, known_variables, measured_val
 from ....core.reconstruction.impact import Impacts
 from ....core.reconstruction.intervals import undetermined
 from ....core.vectors import Mask
-from ...scene import comparison, comparison_scores, graph_settings
+from ...scene.models import comparison, comparison_scores, graph_settings
 from . import drawing, empty, legend, selection
 from .axes import draw_axes
 from .editor import Canvas

@@ -7,7 +7,7 @@ from ....core.analysis.graph_layout import Rectangle
 from ....core.analysis.graph_series import Series
 from ....core.colours import SPEED_SCALE
 from ....core.impact_models.registry import MODELS
-from ...scene.comparison import SceneComparison
+from ...scene.models.comparison import SceneComparison
 from . import drawing
 from .impact_graphs import ImpactGraph
 from .look import Look, Rgb

@@ -11,7 +11,11 @@ from ....core.analysis.axes import Axis, Limits, Ticks
 from ....core.analysis.graph_layout import Frame, Rectangle
 from ....core.analysis.motion_graphs import RESIDUAL, MotionCourse, Quantity, shown_quantities
 from ....core.analysis.stacked_graphs import fitting, quantity_axis, stacked, time_axis
-from ...scene import clocks, motion, motion_settings, next_step, picks, store, timing, videos
+from ...scene import next_step
+from ...scene.footage import clocks, timing, videos
+from ...scene.models import motion, motion_settings
+from ...scene.picks import picks
+from ...scene.storage import store
 from . import drawing, empty
 from .axes import draw_axes
 from .editor import Canvas

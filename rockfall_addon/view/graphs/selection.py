@@ -3,7 +3,9 @@
 
 import bpy
 
-from ...scene import comparison, graph_settings, impact_rows, picks, store
+from ...scene.models import comparison, graph_settings
+from ...scene.picks import impact_rows, picks
+from ...scene.storage import store
 
 Chosen = frozenset[tuple[int, int]]
 """(source, row): source 0 for the scene's own impacts, i for the i-th other table."""

@@ -142,7 +142,7 @@ def test_a_camera_that_the_other_one_contradicts_is_named():
 def test_a_view_alone_says_what_it_cannot_tell_and_allows_for_it():
     views, pixels = filmed(1)
     high = (raised(views[0], 0.3),)
-    believed, doubted = (refined(high, pixels, sigma_datum=sigma) for sigma in (0.0, 0.0014))
+    believed, doubted = (refined(high, pixels, sigma_datum=sigma) for sigma in (0.0, 0.0012))
     assert contradicted(doubted) == set()
     assert np.median(speed_sigmas(doubted) / speed_sigmas(believed)) > 1.2
     higher = next(row for row in doubted.statements if row.error == "Camera of view 1 higher")

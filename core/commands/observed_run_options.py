@@ -144,10 +144,10 @@ def _of_project(
 ) -> ObservedCase:
     """The measured runs of a project; options replace what it says."""
     from ..analysis.completeness import parse_completeness
-    from ..exchange.opening import reconstruct_project
     from ..exchange.project import read_project
-    from ..exchange.scenarios import open_simulation, placed_source
     from ..exchange.simulation_entry import TABLE, ReleaseEntry
+    from ..workflow.opening import reconstruct_project
+    from ..workflow.scenarios import open_simulation, placed_source
     from ..workflow.simulation import ground_of
     from ..workflow.whole_runs import measured_runs
 
@@ -193,17 +193,16 @@ def _of_table(
     from ..analysis.completeness import parse_completeness
     from ..analysis.measured_rebounds import measured_rebounds
     from ..exchange.project import terrain_inputs
-    from ..exchange.scenarios import make_scenario
     from ..exchange.simulation_tables import read_releases
     from ..exchange.tables import read_picks
-    from ..exchange.whole_run_tables import stopped_runs
     from ..impact_models.registry import COMPARED, find_model
     from ..reconstruction.block import Block
     from ..reconstruction.trajectory import reconstruct
     from ..simulation.blocks import block_of
     from ..simulation.measured_releases import from_reconstruction
+    from ..workflow.scenarios import make_scenario
     from ..workflow.simulation import ground_of
-    from ..workflow.whole_runs import measured_runs
+    from ..workflow.whole_runs import measured_runs, stopped_runs
 
     if not arguments.terrain:
         raise InputError("--terrain is missing", advice="Only a project, project.toml, can do without it")
@@ -273,9 +272,8 @@ def _with_more(
     placed : the blocks of a table of releases.
     """
     from ..exchange.tables import read_picks
-    from ..exchange.whole_run_tables import stopped_runs
     from ..impact_models.registry import find_model
-    from ..workflow.whole_runs import ObservedRuns, join_runs, measured_runs
+    from ..workflow.whole_runs import ObservedRuns, join_runs, measured_runs, stopped_runs
 
     if arguments.more_stops:
         _refuse_drawing([name for name in case.scenario.models if find_model(name).draws_from_impacts])

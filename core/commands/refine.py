@@ -16,13 +16,13 @@ from .options import add_out, known_names, naming, not_negative, positive
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
-    from ..exchange.footage import Footage
     from ..exchange.project import Project, RefinementSettings
     from ..reconstruction.impact import Impacts
     from ..reconstruction.picks import Picks
     from ..reconstruction.refinement.reliability import Statement
     from ..reconstruction.refinement.what_if import WhatIf
     from ..terrain.surface import Surface
+    from ..workflow.footage import Footage
     from ..workflow.refinement import Refined
 
 MOST_ROWS = 20
@@ -79,10 +79,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Refine, write the tables and the refined project, print the summary."""
-    from ..exchange.footage import name_trajectory, open_footage
-    from ..exchange.opening import blocks_of, drag_of, open_terrain
     from ..exchange.project import read_project
     from ..output import output_folder
+    from ..workflow.footage import name_trajectory, open_footage
+    from ..workflow.opening import blocks_of, drag_of, open_terrain
     from ..workflow.refinement import refine_picks
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.project):
@@ -130,9 +130,9 @@ def _settings(settings: "RefinementSettings", arguments: argparse.Namespace) -> 
 
 def _picks(project: "Project", surface: "Surface | None", footage: "Footage") -> tuple["Picks", tuple[str, ...]]:
     """The project's picks, or first ones from what was seen; with a sentence about these."""
-    from ..exchange.footage import picks_from_footage
-    from ..exchange.opening import read_project_picks
     from ..exchange.tables import read_picks
+    from ..workflow.footage import picks_from_footage
+    from ..workflow.opening import read_project_picks
 
     if project.picks is not None:
         if surface is None:
@@ -187,7 +187,7 @@ def _write(
     entries = {}
     for i, (video, view) in enumerate(zip(footage.videos, fit.views, strict=True)):
         entry, camera, covariance = video.entry, video.camera, refined.pose_covariance[i]
-        entries[entry.name] = replace(entry, offset_s=view.clock.offset_s, drift=view.clock.drift)
+        entries[entry.name] = replace(entry, offset_s=view.clock.offset_s, drift=view.clock.drift, gaps=view.clock.gaps)
         if covariance is not None:
             file = folder / f"camera_{_as_file(entry.name)}.toml"
             held = {name: value for name, value in camera.sigma.items() if name not in POSE}

@@ -86,9 +86,9 @@ def work_as_asked(arguments: argparse.Namespace, progress: PrintedProgress) -> W
     """
     from ..exchange.saved_blend import is_project
     from ..exchange.simulation_entry import RECORDS
-    from ..exchange.simulation_output import default_records
     from ..workflow.enough import in_chance_order
     from ..workflow.simulation import ground_of
+    from ..workflow.simulation_output import default_records
 
     record = None if arguments.record is None else known_names(arguments.record, RECORDS, "--record")
     prepare = _project if is_project(arguments.releases or "") else _scenario
@@ -130,8 +130,8 @@ def _screens(
 def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> Asked:
     """What the options say."""
     from ..exchange.project import terrain_inputs
-    from ..exchange.scenarios import make_scenario
     from ..terrain.readers import read_structure, read_tile_points
+    from ..workflow.scenarios import make_scenario
 
     for option in ("terrain", "model"):
         if not getattr(arguments, option):
@@ -176,10 +176,10 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> Asked
 
 def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> Asked:
     """A project, in which options replace what its [simulation] says."""
-    from ..exchange.opening import reconstruct_project
     from ..exchange.project import read_project
-    from ..exchange.scenarios import open_simulation
     from ..terrain.surface import Surface
+    from ..workflow.opening import reconstruct_project
+    from ..workflow.scenarios import open_simulation
 
     own = ["--terrain", "--structure", "--gravity", "--zone-attribute", "--spin", "--evenly"]
     for option in (*own, *sources_given(arguments)[1:]):

@@ -13,8 +13,8 @@ from ..reading import reader
 from ..reconstruction.picks import KINDS
 from ..reconstruction.refinement.reliability import Statement
 from ..reconstruction.refinement.what_if import WhatIf
+from ..reconstruction.sightings import Events, Sightings
 from ..vectors import Array, Indices, Mask, Names
-from ..workflow.sightings import Events, Sightings
 from .csv_text import TextTable, read_table
 from .tables import Columns, vector_columns, write_columns
 

@@ -15,10 +15,10 @@ from ..reconstruction.picks import Picks, take
 from ..reconstruction.refinement.refine import refine
 from ..reconstruction.refinement.result import Refinement
 from ..reconstruction.refinement.views import PixelObservations
+from ..reconstruction.sightings import SeenVideo, Sightings, joined, some
 from ..remarks import Remark, gravest_first
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices, norm
-from .sightings import SeenVideo, Sightings, joined, some
 
 NAMED = 8
 """Trajectories that a message lists, at most."""

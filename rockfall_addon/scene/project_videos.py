@@ -11,17 +11,17 @@ import numpy as np
 
 from ...core.camera.model import SIGMA_PX
 from ...core.exchange.cameras import CameraFile, write_camera
-from ...core.exchange.footage import open_entry
 from ...core.exchange.footage_tables import Track, read_track, write_track
-from ...core.exchange.opening import read_project_camera
 from ...core.exchange.project import Project, VideoEntry
 from ...core.exchange.spin_tables import read_spin_marks, write_spin_marks
 from ...core.footage.clock import Clock, clock_for
 from ...core.footage.sequences import is_there
 from ...core.footage.video import Video
 from ...core.georeference import GlobalShift
+from ...core.reconstruction.spin_marks import SpinMarks
 from ...core.terrain.surface import Surface
-from ...core.workflow.spin_marks import SpinMarks
+from ...core.workflow.footage import open_entry
+from ...core.workflow.opening import read_project_camera
 from . import (
     camera_paths,
     clocks,
@@ -71,6 +71,7 @@ def read_videos(project: Project, surface: Surface | None, shift: GlobalShift | 
         clock = clock_for(
             video, entry.capture_rate_hz, offset_s=entry.offset_s, drift=entry.drift, origin_s=entry.origin_s
         )
+        clock = replace(clock, gaps=entry.gaps)
         marks = None if entry.spin_marks is None else read_spin_marks(entry.spin_marks)
         found.append(ReadVideo(entry, video, camera, track, clock, marks))
     return found
@@ -159,6 +160,7 @@ def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]
                 offset_s=clock.offset_s,
                 drift=clock.drift,
                 origin_s=clock.origin_s,
+                gaps=clock.gaps,
                 capture_rate_hz=videos.capture_rate_of(camera),
                 rate_hz=video_files.sequence_rate_of(camera),
                 row_time_s=videos.row_time_of(camera),

@@ -12,9 +12,7 @@ import numpy as np
 
 from ...core.analysis.measured_rebounds import measured_rebounds
 from ...core.errors import RockfallError
-from ...core.exchange.scenarios import make_scenario, times_as_many
 from ...core.exchange.simulation_entry import SimulationEntry
-from ...core.exchange.simulation_output import default_records, write_simulations
 from ...core.hazard.barriers import with_barriers
 from ...core.hazard.screens import Screen, check_screens
 from ...core.impact_models.registry import MODELS, find_model
@@ -28,8 +26,10 @@ from ...core.terrain.cloud import Cloud
 from ...core.terrain.surface import Surface
 from ...core.workflow.maps import SCREENS, Mapped
 from ...core.workflow.mesh_check import change_remarks, mesh_changes
+from ...core.workflow.scenarios import make_scenario, times_as_many
 from ...core.workflow.screens import outside_remarks, screen_remarks, tallies_of
 from ...core.workflow.simulation import ReleaseSource, Scenario, ground_of, remarks_of, run_models
+from ...core.workflow.simulation_output import default_records, write_simulations
 from . import (
     fingerprints,
     models,

@@ -450,7 +450,7 @@ def test_the_exported_project_is_the_same_scenario(scan: bpy.types.Scene, part, 
     assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
     file = tmp_path / "out" / "project.toml"
     project = part("core.exchange.project").read_project(file)
-    scenario, _ = part("core.exchange.scenarios").open_simulation(project, file)
+    scenario, _ = part("core.workflow.scenarios").open_simulation(project, file)
     stated = {one.settings.model: one for one in part("core.workflow.simulation").run_scenario(scenario)}
     assert stated.keys() == shown.keys() == MODELS
     for model, one in stated.items():

@@ -14,6 +14,16 @@ import numpy as np
 
 from ..analysis.measured_rebounds import measured_rebounds
 from ..errors import InputError
+from ..exchange.map_shapes import polygon_of, read_lines, read_polygons
+from ..exchange.parameters import checked_parameters
+from ..exchange.posterior_tables import posteriors_of
+from ..exchange.project import BlockEntry, Project, ReconstructionSettings
+from ..exchange.screens import screens_of
+from ..exchange.simulation_entry import LINE, MEASURED, POINTS, POLYGON, STEEP, TABLE, ReleaseEntry, SimulationEntry
+from ..exchange.simulation_tables import read_releases
+from ..exchange.tables import read_impacts
+from ..exchange.trees import open_trees
+from ..exchange.zones import open_zones
 from ..hazard.screens import Screen
 from ..impact_models.machinery.measured import MeasuredRebounds
 from ..impact_models.registry import COMPARED, find_model
@@ -30,23 +40,14 @@ from ..simulation.parameter_draws import ParameterDraws
 from ..simulation.polygons import Polygon
 from ..simulation.release import Releases
 from ..simulation.release_sources import in_polygon, on_line, on_points, steeper_than
+from ..simulation.zones import Zones
 from ..terrain.cloud import Cloud
 from ..terrain.readers import read_structure, read_tile_points
 from ..terrain.surface import Surface
-from ..workflow.simulation import ReleaseSource, Scenario, Zones
 from .footage import measured_in
-from .map_shapes import polygon_of, read_lines, read_polygons
 from .opening import open_terrain, read_project_picks, reconstruct_project
-from .parameters import checked_parameters
-from .posterior_tables import posteriors_of
-from .project import BlockEntry, Project, ReconstructionSettings
-from .screens import screens_of
-from .simulation_entry import LINE, MEASURED, POINTS, POLYGON, STEEP, TABLE, ReleaseEntry, SimulationEntry
+from .simulation import ReleaseSource, Scenario
 from .simulation_output import recorded_for
-from .simulation_tables import read_releases
-from .tables import read_impacts
-from .trees import open_trees
-from .zones import open_zones
 
 SAME_TIME_S = 1e-6
 

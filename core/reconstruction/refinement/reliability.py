@@ -141,7 +141,7 @@ def on_statements(rows: Sequence[Statement]) -> Iterator[Remark]:
             f"tell. {CHECK[row.about.split()[0]]}"
         )
         yield Remark(text, "warning", row.about)
-    unseen = [row for row in rows if row.about not in (TIME, PLACE) and row.intervals > 1]
+    unseen = [row for row in rows if row.about not in (CONTACT, TIME, PLACE) and row.intervals > 1]
     if unseen:
         row = max(unseen, key=lambda one: one.most_speed_percent)
         error = row.error[0].lower() + row.error[1:]

@@ -4,6 +4,7 @@
 The simulator itself is held against closed forms first.
 """
 
+import csv
 import sys
 from pathlib import Path
 
@@ -14,12 +15,15 @@ from rockfall.core.georeference import GlobalShift
 from rockfall.core.simulation.engine import IMPACT, ON_GROUND, Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import make_releases, placed_on
+from rockfall.core.terrain.readers import read_terrain
 from rockfall.core.terrain.surface import Surface
+from scipy.interpolate import RectBivariateSpline
 
 sys.path.insert(0, str(Path(__file__).parent))
 from simulation_oracle import Triangles, _foot, fall, fall_on_function
 
 RADIUS = 0.15
+DATA = Path(__file__).parents[1] / "data"
 
 
 def sheet(x: np.ndarray, y: np.ndarray, height) -> Surface:
@@ -162,3 +166,30 @@ def test_a_block_that_touches_two_walls_of_a_ditch_rolls_along_it() -> None:
     plain = fall(gaps, start[0], velocity[0], RADIUS, parameters={"rn": 0.0, "rt": 1.0}, friction=0.2, most_s=2.0)
     assert np.linalg.norm(plain.position - start[0]) > 3.0
     np.testing.assert_allclose(run.position[0], plain.position, atol=0.03 * np.linalg.norm(plain.position - start[0]))
+
+
+def test_a_real_grid_of_5_m_gives_the_run_out_of_a_smooth_surface_through_it() -> None:
+    """Tschamut: blocks on the survey's grid, and on the bicubic spline through its nodes, sampled every 0.5 m."""
+    coarse = read_terrain(DATA / "tschamut_2014_terrain.asc")
+    v = coarse.vertices
+    x, y = np.unique(v[:, 0]), np.unique(v[:, 1])
+    z = np.empty((x.size, y.size))
+    z[np.searchsorted(x, v[:, 0]), np.searchsorted(y, v[:, 1])] = v[:, 2]
+    spline = RectBivariateSpline(x, y, z)
+    fine = sheet(np.arange(x[0], x[-1], 0.5), np.arange(y[0], y[-1], 0.5), lambda x, y: spline.ev(x, y))
+    with (DATA / "tschamut_2014_releases.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))[::2]
+    place, velocity = (
+        np.array([[float(row[name]) for name in names] for row in rows])
+        for names in (("x_m", "y_m"), ("vx_mps", "vy_mps", "vz_mps"))
+    )
+    size = np.full(len(rows), 0.35)
+    far = []
+    for surface in (coarse, fine):
+        ground = make_ground(surface)
+        start = placed_on(ground, place, size)
+        releases = make_releases(start, velocity=velocity, diameter_m=size)
+        run = simulate(ground, releases, Settings("azimi_desvarreux_1977", friction=0.46), record="ends")
+        far.append(float(np.hypot(*(run.position - start)[:, :2].T).mean()))
+    assert far[1] > 80.0
+    assert far[0] == pytest.approx(far[1], rel=0.05)

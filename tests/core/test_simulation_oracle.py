@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rockfall.core.constants import GRAVITY_MPS2 as G
-from rockfall.core.georeference import GlobalShift
 from rockfall.core.simulation.engine import IMPACT, ON_GROUND, Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import make_releases, placed_on
@@ -20,20 +19,11 @@ from rockfall.core.terrain.surface import Surface
 from scipy.interpolate import RectBivariateSpline
 
 sys.path.insert(0, str(Path(__file__).parent))
+from sheets import sheet
 from simulation_oracle import Triangles, _foot, fall, fall_on_function
 
 RADIUS = 0.15
 DATA = Path(__file__).parents[1] / "data"
-
-
-def sheet(x: np.ndarray, y: np.ndarray, height) -> Surface:
-    x, y = np.meshgrid(x, y)
-    i = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = (part.ravel() for part in (i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]))
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    return Surface(
-        np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3), faces.astype(np.int32), GlobalShift(), "sheet"
-    )
 
 
 def triangles(surface: Surface) -> Triangles:

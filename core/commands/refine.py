@@ -187,7 +187,7 @@ def _write(
     entries = {}
     for i, (video, view) in enumerate(zip(footage.videos, fit.views, strict=True)):
         entry, camera, covariance = video.entry, video.camera, refined.pose_covariance[i]
-        entries[entry.name] = replace(entry, offset_s=view.clock.offset_s, drift=view.clock.drift)
+        entries[entry.name] = replace(entry, offset_s=view.clock.offset_s, drift=view.clock.drift, gaps=view.clock.gaps)
         if covariance is not None:
             file = folder / f"camera_{_as_file(entry.name)}.toml"
             held = {name: value for name, value in camera.sigma.items() if name not in POSE}

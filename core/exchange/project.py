@@ -136,7 +136,8 @@ class VideoEntry:
     track : track.csv, the block in the frames.
     events : events.csv, the impacts seen in the frames; first picks are made from it where the project has none.
     spin_marks : spin_marks.csv, one point of the block in two frames or more of a flight, for its spin.
-    offset_s, drift, origin_s : of the `Clock`: common time = offset + (1 + drift) · rate · (video time − origin).
+    offset_s, drift, origin_s, gaps : of the `Clock`: common time = offset + (1 + drift) · rate · (video time − origin),
+        the video time with the gaps that its file does not tell.
     capture_rate_hz : pictures per second when filming; None when the file plays at the speed of the fall.
     rate_hz : pictures per second of a sequence of pictures, which has no times of its own; None for a video file.
     row_time_s : readout time of one row of the image [s]: rolling shutter, 0 for a global one; None when not known.
@@ -151,6 +152,7 @@ class VideoEntry:
     offset_s: float = 0.0
     drift: float = 0.0
     origin_s: float = 0.0
+    gaps: tuple[tuple[float, float], ...] = ()
     capture_rate_hz: float | None = None
     rate_hz: float | None = None
     row_time_s: float | None = None
@@ -351,7 +353,7 @@ def _plain(part: Any) -> dict[str, Any]:
     """A part as TOML can hold it: None left out, the unknown keys at the end."""
     values: dict[str, Any] = {}
     for key, value in vars(part).items():
-        if key == "extra" or value is None:
+        if key == "extra" or value is None or (key == "gaps" and not value):
             continue
         if isinstance(value, tuple):
             values[key] = list(value)
@@ -430,6 +432,7 @@ def _video(table: TomlTable) -> VideoEntry:
         offset_s=table.signed("offset_s", 0.0),
         drift=table.signed("drift", 0.0),
         origin_s=table.signed("origin_s", 0.0),
+        gaps=tuple((row[0], row[1]) for row in table.rows("gaps", 2, "[[video time of the last frame, seconds lost]]")),
         capture_rate_hz=table.optional_number("capture_rate_hz"),
         rate_hz=table.optional_number("rate_hz"),
         row_time_s=table.optional_number("row_time_s", zero_allowed=True),

@@ -164,6 +164,14 @@ class TomlTable:
                 raise self.wrong(key, "is not a list of points", "Write [[x, y], [x, y, z]]; without z on the terrain")
         return tuple(tuple(float(self._plausible("position", item)) for item in row) for row in rows)
 
+    def rows(self, key: str, width: int, wanted: str) -> tuple[tuple[float, ...], ...]:
+        """Rows of so many finite numbers; empty when it is missing."""
+        value = self._taken(key, [], wanted)
+        good = isinstance(value, list) and all(isinstance(row, list) and len(row) == width for row in value)
+        if not good or not all(is_number(item) for row in value for item in row):
+            raise self.wrong(key, f"is {value!r}", f"Write {wanted}")
+        return tuple(tuple(float(self._plausible(key, item)) for item in row) for row in value)
+
     def numbers(self, key: str, shape: tuple[int, ...]) -> Array:
         """An array of this shape; its rows are the inner lists."""
         wanted = " rows of ".join(map(str, shape)) + " numbers"

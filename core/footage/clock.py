@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Clocks: from a video's own timestamps to the time that all videos and picks share."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, overload
 
 import numpy as np
@@ -24,7 +24,7 @@ LIKELY_DRIFT = 0.005
 
 @dataclass(frozen=True)
 class Clock:
-    """Common time = offset_s + (1 + drift) · rate · (video time − origin_s).
+    """Common time = offset_s + (1 + drift) · rate · (video time − origin_s), the video time with its gaps.
 
     Attributes
     ----------
@@ -32,6 +32,8 @@ class Clock:
     drift : how much more common time passes than the video's clock says, relative (1e-5 = 36 ms in an hour).
     origin_s : video time about which the drift turns [s].
     rate : file rate / capture rate: 1/8 for 240 pictures a second stored at 30.
+    gaps : where the file's times are not those of the frames: the video time of the last frame before, and by how much
+        all later ones are late [s of the video]; below zero where frames are doubled. In time order.
 
     Raises
     ------
@@ -42,10 +44,10 @@ class Clock:
     drift: float = 0.0
     origin_s: float = 0.0
     rate: float = 1.0
+    gaps: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
-        values = (self.offset_s, self.drift, self.origin_s, self.rate)
-        if not (np.isfinite(values).all() and self.rate > 0 and self.drift > -1):
+        if not (np.isfinite(self.numbers).all() and self.rate > 0 and self.drift > -1):
             raise InputError(
                 f"This clock does not run: offset {self.offset_s:g} s, drift {self.drift:g}, "
                 f"origin {self.origin_s:g} s, rate {self.rate:g}",
@@ -63,7 +65,7 @@ class Clock:
     def to_common(self, video_s: Array) -> Array: ...
     def to_common(self, video_s: Any) -> Any:
         """Common time of video times [s]."""
-        return self.offset_s + self.speed * (video_s - self.origin_s)
+        return self.offset_s + self.speed * (self.filmed(video_s) - self.origin_s)
 
     @overload
     def to_video(self, common_s: float) -> float: ...
@@ -71,7 +73,39 @@ class Clock:
     def to_video(self, common_s: Array) -> Array: ...
     def to_video(self, common_s: Any) -> Any:
         """Video time of common times [s]."""
-        return self.origin_s + (common_s - self.offset_s) / self.speed
+        video_s = self.origin_s + (common_s - self.offset_s) / self.speed
+        for at, lost in self.gaps:  # in a gap it is the frame before; what doubled frames show twice is the first time
+            after = video_s > at + max(lost, 0.0)
+            video_s = np.where(after, video_s - lost, np.minimum(video_s, at) if lost > 0 else video_s)
+        return float(video_s) if self.gaps and np.ndim(common_s) == 0 else video_s
+
+    @overload
+    def filmed(self, video_s: float) -> float: ...
+    @overload
+    def filmed(self, video_s: Array) -> Array: ...
+    def filmed(self, video_s: Any) -> Any:
+        """Video times as they would be without the gaps [s]."""
+        if not self.gaps:
+            return video_s
+        late = sum(np.where(np.asarray(video_s) > at, lost, 0.0) for at, lost in self.gaps)
+        return float(video_s + late) if np.ndim(video_s) == 0 else video_s + late
+
+    @property
+    def numbers(self) -> list[float]:
+        """All of it as a list: offset, drift, origin, rate, and both numbers of each gap."""
+        return [self.offset_s, self.drift, self.origin_s, self.rate, *(value for gap in self.gaps for value in gap)]
+
+    @classmethod
+    def of_numbers(cls, numbers: Iterable[float]) -> "Clock":
+        """The clock of such a list."""
+        offset_s, drift, origin_s, rate, *gaps = (float(value) for value in numbers)
+        return cls(offset_s, drift, origin_s, rate, tuple(zip(gaps[::2], gaps[1::2], strict=True)))
+
+    def with_gap(self, at_s: float, lost_s: float) -> "Clock":
+        """With a further gap; one at the same frame is changed by as much."""
+        known = dict(self.gaps)
+        known[at_s] = known.get(at_s, 0.0) + lost_s
+        return replace(self, gaps=tuple(sorted(known.items())))
 
 
 @dataclass(frozen=True, eq=False)

@@ -264,7 +264,7 @@ def clock_of(entry: VideoEntry, frame: Indices, time_s: Array) -> Clock:
     rate = 1.0
     if entry.capture_rate_hz is not None:
         rate = _file_rate(entry, frame, time_s) / entry.capture_rate_hz
-    return Clock(entry.offset_s, entry.drift, entry.origin_s, rate)
+    return Clock(entry.offset_s, entry.drift, entry.origin_s, rate, entry.gaps)
 
 
 def _read(

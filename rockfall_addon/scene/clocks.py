@@ -6,6 +6,7 @@ the origin on, times the scene's rate.
 """
 
 import json
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -22,12 +23,12 @@ SAME_RATE = 1e-5
 
 def clock_of(camera: bpy.types.Object) -> Clock:
     """From the file's times to the common clock."""
-    return Clock(*(float(value) for value in camera[store.CLOCK]))
+    return Clock.of_numbers(camera[store.CLOCK])
 
 
 def set_clock(camera: bpy.types.Object, clock: Clock) -> None:
     """Store a clock; the camera's keys follow by `follow_clock`, when the scene is drawn next."""
-    camera[store.CLOCK] = [clock.offset_s, clock.drift, clock.origin_s, clock.rate]
+    camera[store.CLOCK] = clock.numbers
 
 
 def set_capture_rate(camera: bpy.types.Object, capture_rate_hz: float | None) -> None:
@@ -41,7 +42,7 @@ def set_capture_rate(camera: bpy.types.Object, capture_rate_hz: float | None) ->
     """
     old, video = clock_of(camera), video_files.stored_video(camera)
     clock = clock_for(video, capture_rate_hz or None, offset_s=old.offset_s, drift=old.drift, origin_s=old.origin_s)
-    set_clock(camera, clock)
+    set_clock(camera, replace(clock, gaps=old.gaps))
     camera[store.CAPTURE_RATE] = float(capture_rate_hz or 0.0)
     known = videos.facts_of(camera) | {"advice": rate_advice(video, capture_rate_hz=capture_rate_hz or None)}
     camera[store.VIDEO_FACTS] = json.dumps(known)

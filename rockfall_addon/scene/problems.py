@@ -70,7 +70,7 @@ def first_instant(scene: bpy.types.Scene) -> float | None:
     for obj in store.of_role(scene, CAMERA_ROLE):
         if store.VIDEO_TIMES in obj and store.CLOCK in obj:
             times = obj[store.VIDEO_TIMES]
-            offset, drift, origin, rate = obj[store.CLOCK]
+            offset, drift, origin, rate, *_ = obj[store.CLOCK]
             if len(times):
                 starts.append(offset + (1 + drift) * rate * (times[0] - origin))
     if starts:

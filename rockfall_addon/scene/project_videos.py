@@ -71,6 +71,7 @@ def read_videos(project: Project, surface: Surface | None, shift: GlobalShift | 
         clock = clock_for(
             video, entry.capture_rate_hz, offset_s=entry.offset_s, drift=entry.drift, origin_s=entry.origin_s
         )
+        clock = replace(clock, gaps=entry.gaps)
         marks = None if entry.spin_marks is None else read_spin_marks(entry.spin_marks)
         found.append(ReadVideo(entry, video, camera, track, clock, marks))
     return found
@@ -159,6 +160,7 @@ def write_videos(scene: bpy.types.Scene, folder: Path) -> tuple[VideoEntry, ...]
                 offset_s=clock.offset_s,
                 drift=clock.drift,
                 origin_s=clock.origin_s,
+                gaps=clock.gaps,
                 capture_rate_hz=videos.capture_rate_of(camera),
                 rate_hz=video_files.sequence_rate_of(camera),
                 row_time_s=videos.row_time_of(camera),

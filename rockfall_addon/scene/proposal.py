@@ -117,10 +117,8 @@ def keep(scene: bpy.types.Scene, refined: Refined, cameras: Sequence[bpy.types.O
         "what_if": [[row.cells[0], row.cells[2], row.cells[4]] for row in gravest(fit.what_if)],
         "unnoticed": [[row.cells[0], row.cells[1], row.cells[3]] for row in worst(fit.statements)],
         "advice": [[remark.text, remark.severity, remark.about] for remark in refined.remarks],
-        "clocks": {
-            identifier: [view.clock.offset_s, view.clock.drift, view.clock.origin_s, view.clock.rate]
-            for identifier, view in zip(ids, fit.views, strict=True)
-        },
+        "clocks": {identifier: view.clock.numbers for identifier, view in zip(ids, fit.views, strict=True)},
+        "gaps": any(view.clock.gaps for view in fit.views),
         "gravity_mps2": fit.reconstruction.gravity_mps2,
         "drag": refined.drag_coefficient,
         "rmse_px": dict(zip(ids, rmse_px, strict=True)),
@@ -244,11 +242,11 @@ def _path(fit: Refinement) -> Array:
 
 def _apply_shared(scene: bpy.types.Scene, kept: dict[str, Any]) -> None:
     """Clocks, poses, gravity and drag that were fitted."""
-    if "clock" in kept["free"]:
+    if "clock" in kept["free"] or kept.get("gaps"):
         for identifier, values in kept["clocks"].items():
             camera = videos.by_id(scene, identifier)
             if camera is not None:
-                clocks.set_clock(camera, Clock(*values))
+                clocks.set_clock(camera, Clock.of_numbers(values))
                 camera_paths.follow_clock(scene, camera)
     if store.PROPOSAL_POSES in scene:
         for identifier, poses in scene[store.PROPOSAL_POSES].to_dict().items():

@@ -77,7 +77,7 @@ def _text(value: object) -> str:
 
 
 def _clock(value: object) -> str:
-    problem = numbers(4)(value)
+    problem = series(2)(value) or ("" if len(value) >= 4 else "is no list of 4 numbers")
     return problem or ("" if 1 + value[1] > 0 and value[3] > 0 else BEYOND)
 
 
@@ -136,7 +136,7 @@ BY_ROLE: dict[str, Kept] = {
             store.CAMERA_SHIFT: _place,
             store.RMSE: _amount,
             store.ASPECT: numbers(2, 1e-3, 1e3),
-            store.CAMERA_KEYED: numbers(6),
+            store.CAMERA_KEYED: series(2),
             store.CAPTURE_RATE: number(0.0, OF_UNIT["hz"]),
             store.ROW_TIME: number(-1.0, 1.0),
             store.VIDEO_FACTS: json_of(dict),

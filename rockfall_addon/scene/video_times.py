@@ -2,13 +2,14 @@
 """When things happen in the videos: true frames, the time origin, and events that synchronise several cameras."""
 
 import json
+from dataclasses import replace
 
 import bpy
 import numpy as np
 
 from ...core.errors import RockfallError
 from ...core.footage.advice import time_sigma_s
-from ...core.footage.clock import DRIFT_NEEDS, Clock, synchronise
+from ...core.footage.clock import DRIFT_NEEDS, synchronise
 from ...core.remarks import Remark, to_text
 from . import clocks, footage, picks, reconstruction, store, videos
 
@@ -70,7 +71,7 @@ def zero_here(scene: bpy.types.Scene, camera: bpy.types.Object) -> None:
     zero = shown_common_s(scene, camera)
     for each in videos.cameras(scene):
         old = clocks.clock_of(each)
-        clocks.set_clock(each, Clock(old.offset_s - zero, old.drift, old.origin_s, old.rate))
+        clocks.set_clock(each, replace(old, offset_s=old.offset_s - zero))
     scene[store.TIME_ORIGIN] = 0.0
     _shown_again(scene)
     go_to(scene, 0.0)
@@ -159,13 +160,13 @@ def synchronise_cameras(scene: bpy.types.Scene, *, fit_drift: bool) -> list[Rema
         own = clocks.clock_of(camera)
         fit = synchronise(
             common,
-            [seen[number] for number in both],
+            [own.filmed(seen[number]) for number in both],
             rate=own.rate,
             fit_drift=drifts,
             sigma_s=sigma,
             names=[str(number) for number in both],
         )
-        clocks.set_clock(camera, fit.clock)
+        clocks.set_clock(camera, replace(fit.clock, gaps=own.gaps))
         sentence = _sentence(camera, reference, both, fit.residual_s, fit.sigma_offset_s, fit.clock.drift, drifts)
         remarks = [Remark(sentence, "note", camera.name), *fit.remarks]
         camera[store.SYNCHRONISED] = to_text(remarks)

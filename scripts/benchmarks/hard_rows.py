@@ -21,9 +21,11 @@ from typing import Any
 import numpy as np
 from refinement import CAMERA, TERRAIN, Case, film
 from rn_intervals import GIVEN_STEP_M, TRUE_STEP_M, Slope, make_slope, truth_of
+from rockfall.core.camera.model import project, rays
 from rockfall.core.reconstruction.picks import Picks
 from rockfall.core.reconstruction.refinement.refine import PixelObservations, Refinement, View, refine
 from rockfall.core.terrain.orientation import default_normal_radius
+from rockfall.core.terrain.raycast import cast_rays, closest_points
 from rockfall.core.terrain.surface import Surface
 from synthetic_falls import BLOCK, SIGMA_TERRAIN, Fall, fall
 
@@ -37,6 +39,10 @@ OUTLIERS, OUTLIER_PX = 0.08, 60.0
 """Part of the pixels that are on something else, and how far off they are at most."""
 STEADY_PX = 0.6
 """By how much each frame of stabilised footage is off, of which its stabiliser says a third."""
+
+RATE_HZ, LOST, STATED_HZ, ZOOM = 30.0, 3, 25.0 * 30 / 29.97, 0.06
+GONE_M, GONE_INNER_M, GONE_OUTER_M = 0.3, 0.8, 1.6
+"""What is gone of the ground within a distance, less and less to the next one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,6 +161,81 @@ def stabilised(scene: Scene, truth: Fall, rng: np.random.Generator) -> Trial:
     return replace(trial, pixels=replace(trial.pixels, pixel=trial.pixels.pixel + off[index]))
 
 
+def dropped(scene: Scene, truth: Fall, rng: np.random.Generator, *, views: int = 1) -> Trial:
+    """The first video lost three frames somewhere; the times of those that are left are even."""
+    trial = filmed(scene, truth, rng, views=views, cause=("are missing",))
+    view, pixels = trial.views[0], trial.pixels
+    mine = pixels.view == 0
+    inside = np.unique(pixels.time_s[mine])
+    first = float(rng.choice(inside[len(inside) // 7 : -len(inside) // 7]))
+    lost = LOST / RATE_HZ
+
+    def even(time_s: np.ndarray) -> np.ndarray:
+        return np.where(time_s > first, np.maximum(time_s - lost, first), time_s)
+
+    def gone(time_s: np.ndarray) -> np.ndarray:
+        return (time_s > first + 1e-6) & (time_s < first + lost + 1e-6)
+
+    path, kept = view.path, ~gone(view.path.time_s)
+    path = replace(
+        path,
+        time_s=even(path.time_s[kept]),
+        position=path.position[kept],
+        rotation=path.rotation[kept],
+        sigma_position_m=path.sigma_position_m[kept],
+        sigma_rotation=path.sigma_rotation[kept],
+    )
+    pixels = replace(pixels, time_s=np.where(mine, even(pixels.time_s), pixels.time_s))
+    pixels = pixels.take(~(mine & gone(trial.pixels.time_s)))
+    marked_s = view.clock.to_common(even(view.clock.to_video(trial.picks.time_s)))
+    picks = replace(trial.picks, time_s=marked_s)
+    return replace(trial, views=(replace(view, path=path), *trial.views[1:]), pixels=pixels, picks=picks)
+
+
+def eroded(scene: Scene, truth: Fall, rng: np.random.Generator, *, views: int = 1) -> Trial:
+    """At one impact 0.3 m of ground are gone since the scan."""
+    contact = truth.contact[int(rng.integers(1, len(truth.contact) - 1))]
+    vertices = scene.given.vertices.copy()
+    away = np.linalg.norm(vertices[:, :2] - contact[:2], axis=1)
+    vertices[:, 2] += GONE_M * np.clip((GONE_OUTER_M - away) / (GONE_OUTER_M - GONE_INNER_M), 0, 1)
+    surface = Surface(vertices, scene.given.faces, scene.given.shift, "before")
+    return filmed(scene, truth, rng, views=views, surface=surface, cause=("lower than the terrain",))
+
+
+def wrong_rate(scene: Scene, truth: Fall, rng: np.random.Generator) -> Trial:
+    """A video of 29.97 frames per second is taken for one of 25."""
+    trial = filmed(scene, truth, rng, cause=("capture rate",))
+    view, longer = trial.views[0], RATE_HZ / STATED_HZ
+    path, clock = replace(view.path, time_s=longer * view.path.time_s), view.clock
+    picks = replace(trial.picks, time_s=clock.to_common(longer * np.asarray(clock.to_video(trial.picks.time_s))))
+    pixels = replace(trial.pixels, time_s=longer * trial.pixels.time_s)
+    return replace(trial, views=(replace(view, path=path),), picks=picks, pixels=pixels)
+
+
+def zoomed(scene: Scene, truth: Fall, rng: np.random.Generator) -> Trial:
+    """The focal length changes by 6 % up and down over the fall; the camera was solved where it was in the middle."""
+    trial = filmed(scene, truth, rng, cause=("zoom",))
+    view, camera_ = trial.views[0], trial.views[0].path.reference
+    span = np.ptp(trial.pixels.time_s)
+    phase, periods = rng.uniform(0, 2 * np.pi), rng.uniform(0.5, 1.0)
+
+    def larger(time_s: np.ndarray) -> np.ndarray:
+        return 1 + ZOOM * np.sin(2 * np.pi * periods * (time_s - trial.pixels.time_s[0]) / span + phase)[:, None]
+
+    middle = np.array([camera_.cx, camera_.cy])
+    pixel = middle + (trial.pixels.pixel - middle) * larger(trial.pixels.time_s)
+    video_s = np.asarray(view.clock.to_video(trial.picks.time_s))
+    position, rotation = view.path.poses_at(video_s)
+    clicked = project(camera_, trial.picks.position, position=position, rotation=rotation)
+    origin, direction = rays(
+        camera_, middle + (clicked - middle) * larger(video_s), position=position, rotation=rotation
+    )
+    point = cast_rays(trial.surface, origin, direction).point
+    near = closest_points(trial.surface, trial.picks.position).point
+    point = np.where(np.isfinite(point) & (np.linalg.norm(point - near, axis=1) < 20)[:, None], point, near)
+    return replace(trial, pixels=replace(trial.pixels, pixel=pixel), picks=replace(trial.picks, position=point))
+
+
 ROWS: dict[str, RowOf] = {
     "nothing untrue, one view": filmed,
     "nothing untrue, two views": partial(filmed, views=2),
@@ -168,6 +249,12 @@ ROWS: dict[str, RowOf] = {
     "side view": partial(filmed, azimuth_deg=(80.0, 100.0)),
     "stabilised": stabilised,
     "outliers": outliers,
+    "three frames lost": dropped,
+    "three frames lost in the first of two views": partial(dropped, views=2),
+    "0.3 m of ground gone at one impact": eroded,
+    "0.3 m of ground gone at one impact, two views": partial(eroded, views=2),
+    "25 frames per second for 29.97": wrong_rate,
+    "zoom of ± 6 %": zoomed,
 }
 
 

@@ -34,6 +34,7 @@ class Accelerations:
     sigma_mps2 : standard deviation of one of their components.
     covariance : (size + 3k, size + 3k) of the errors of the unknowns, and of the accelerations about none.
     tracks : noise of the tracks with the accelerations.
+    gain : logarithm of the ratio of likelihoods with and without.
     """
 
     problem: Problem
@@ -41,6 +42,7 @@ class Accelerations:
     sigma_mps2: float
     covariance: Array
     tracks: tuple[TrackNoise, ...]
+    gain: float
 
 
 def find_accelerations(problem: Problem, solution: Solution, noise: float) -> Accelerations | None:
@@ -98,7 +100,7 @@ def find_accelerations(problem: Problem, solution: Solution, noise: float) -> Ac
     found = np.zeros((len(problem.first), 3))
     found[flying] = mean.reshape(-1, 3)
     kept = tuple(replace(track, columns=track.columns[track.columns < size]) for track in tracks)
-    return Accelerations(wide, found, float(SIZES_MPS2[best]), covariance, kept)
+    return Accelerations(wide, found, float(SIZES_MPS2[best]), covariance, kept, gain[best])
 
 
 def _with_accelerations(problem: Problem, solution: Solution) -> Rows:

@@ -13,6 +13,7 @@ from ..triangulation import GRAZING_DEG
 from .assumptions import on_assumptions
 from .contact_pixels import while_landed
 from .deviations import Fit
+from .faults import in_words
 from .problem import CLOCK_COLUMN, NODE, solve_segments
 from .setup import Ground, Setup
 from .solver import normal_equations
@@ -45,6 +46,7 @@ def remarks_on(
     """Remarks on solved problems, what does not fit first; residual (m, 2) is NaN for pixels that were not used."""
     late = [remark for fit in fits for remark in _late_views(fit)]
     remarks = [remark for remark in late if remark.severity == "warning"]  # which is what the pixels then do not fit by
+    remarks += [remark for fit in fits for remark in _faults(fit)]
     remarks += [*_outliers(views, observations, residual, outlier), *on_assumptions(ground, views, fits)]
     seen = set(observations.trajectory.tolist())
     for name in dict.fromkeys(ground.picks.trajectory.tolist()):
@@ -73,6 +75,17 @@ def remarks_on(
             *_grazing(fit),
         ]
     return (*remarks, *(remark for remark in late if remark.severity != "warning"))
+
+
+def _faults(fit: Fit) -> Iterator[Remark]:
+    """What was found untrue of what was given; a wrong rate is said with gravity."""
+    problem = fit.setup.problem
+    for fault in fit.faults:
+        if fault.kind == "ground":
+            node = int(problem.grounded[int(fault.at)])
+            yield Remark(in_words(problem, fault, _pick(fit, node)), "warning", _trajectory(fit.setup, node))
+        elif fault.kind != "rate":
+            yield Remark(in_words(problem, fault, ""), "warning", f"view {problem.views[fault.view].name}")
 
 
 def _joined(spans: Sequence[Array]) -> list[tuple[float, float]]:

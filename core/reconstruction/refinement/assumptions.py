@@ -39,20 +39,28 @@ def _on_gravity(fits: Sequence[Fit]) -> Iterator[Remark]:
     found = [_gravity_of(fit) for fit in fits]
     weight = np.array([sigma**-2 for _, sigma in found])
     value, sigma = float(weight @ [one for one, _ in found] / weight.sum()), float(weight.sum() ** -0.5)
+    rates = [fault for fit in fits for fault in fit.faults if fault.kind == "rate"]
+    if rates:
+        longer = 1 + float(np.median([fault.value[0] for fault in rates]))
+        value = GRAVITY_MPS2 * longer**2
+        sigma = 2 * GRAVITY_MPS2 * longer * float(np.median([fault.sigma[0] for fault in rates]))
     off = abs(value - GRAVITY_MPS2)
-    if value > 0 and off > GRAVITY_OFF * GRAVITY_MPS2 and off > GRAVITY_SIGNIFICANCE * sigma:
+    wrong = off > GRAVITY_OFF * GRAVITY_MPS2 and off > GRAVITY_SIGNIFICANCE * sigma
+    if value > 0 and (rates or wrong):
         text = (
             f"The flights have a gravity of {value:.3g} ± {sigma:.1g} m/s² instead of {GRAVITY_MPS2:g}: lengths should "
             f"be {GRAVITY_MPS2 / value:.3g} times as large (check the unit of the terrain), or times "
             f"{np.sqrt(value / GRAVITY_MPS2):.3g} times as long (check the capture rate of the video)."
         )
+        if rates:
+            text += " The deviations contain the latter."
         yield Remark(text, "warning", "gravity")
 
 
 def _on_accelerations(fits: Sequence[Fit]) -> Iterator[Remark]:
     """Flights that are not those of gravity and drag."""
     found = [(fit, fit.accelerations) for fit in fits if fit.accelerations is not None]
-    if not found:
+    if not found or any(fault.kind == "rate" for fit, _ in found for fault in fit.faults):
         return
     size = float(np.median([one.sigma_mps2 for _, one in found]))
     names = [name for fit, _ in found for name in fit.setup.names]

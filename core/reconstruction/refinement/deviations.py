@@ -11,7 +11,9 @@ from ...vectors import Array, Indices
 from ..node_motion import NodeMotion
 from .accelerations import Accelerations, find_accelerations
 from .correlation import TrackNoise, track_noise
+from .faults import Fault
 from .held_poses import spread_of_poses
+from .mending import Mended, spread_of_faults
 from .problem import NODE, Problem
 from .search import Rival
 from .setup import Setup
@@ -30,6 +32,7 @@ class Fit:
     scale : factor on the stated standard deviations, which the covariance contains.
     tracks : the noise of each track, which the covariance contains where it is correlated.
     accelerations : of the flights beside gravity, where the pixels ask for them.
+    mended : what was found untrue of what was given.
     rivals : other solutions within the noise; chance (r,) of each, this one's being the rest of its trajectory's.
     """
 
@@ -42,10 +45,18 @@ class Fit:
     rivals: tuple[Rival, ...] = ()
     chance: Array = field(default_factory=lambda: np.zeros(0))
     accelerations: Accelerations | None = None
+    mended: Mended | None = None
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """What was found untrue of what was given."""
+        return () if self.mended is None else self.mended.faults
 
 
-def with_covariance(setup: Setup, solution: Solution, rivals: Sequence[Rival] = ()) -> Fit:
-    """The covariance, enlarged when the residuals are larger than the stated noise allows, and by the rivals."""
+def with_covariance(
+    setup: Setup, solution: Solution, rivals: Sequence[Rival] = (), mended: Mended | None = None
+) -> Fit:
+    """The covariance, enlarged when the residuals are larger than the stated noise allows, by rivals and by faults."""
     used = solution.weight > 0
     pixels = solution.evaluation.pixels.residual[used]
     squares = float((solution.weight[used, None] * pixels**2).sum())
@@ -64,11 +75,18 @@ def with_covariance(setup: Setup, solution: Solution, rivals: Sequence[Rival] = 
         alike[np.ix_(track.columns, track.columns)] += track.excess
     covariance = scale**2 * (independent + independent @ alike @ independent)
     poses = spread_of_poses(setup.problem, solution, independent)
+    faults = np.zeros((len(poses), 0))
+    if mended is not None:
+        faults = spread_of_faults(setup.problem, solution, independent, mended.faults)
+        faults *= np.sqrt(np.trace(covariance) / max(np.trace(independent), 1e-300))
     accelerations = find_accelerations(setup.problem, solution, setup.noise)
     if accelerations is not None:
         covariance, tracks = accelerations.covariance, accelerations.tracks
         setup = replace(setup, problem=accelerations.problem)
-    covariance[: len(poses), : len(poses)] += poses @ poses.T
+    covariance[: len(poses), : len(poses)] += poses @ poses.T + faults @ faults.T
+    for other in () if mended is None else mended.otherwise:
+        away = np.column_stack([other.centre - solution.state.centre, other.time_s - solution.state.time_s]).ravel()
+        covariance[: away.size, : away.size] += np.outer(away, away)
     odds = np.array([np.exp(-rival.worse / scale**2) for rival in rivals])
     of = np.array([rival.trajectory for rival in rivals])
     chance = np.array([one / (1 + odds[of == name].sum()) for one, name in zip(odds, of, strict=True)])
@@ -78,7 +96,9 @@ def with_covariance(setup: Setup, solution: Solution, rivals: Sequence[Rival] = 
         away[:, 3] = rival.time_s - solution.state.time_s[rival.nodes]
         place = (NODE * rival.nodes[:, None] + np.arange(NODE)).ravel()
         covariance[place[:, None], place] += weight * np.outer(away, away)
-    return Fit(setup, solution, covariance, scale**2 * independent, scale, tracks, tuple(rivals), chance, accelerations)
+    return Fit(
+        setup, solution, covariance, scale**2 * independent, scale, tracks, tuple(rivals), chance, accelerations, mended
+    )
 
 
 def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_end: bool) -> Array:

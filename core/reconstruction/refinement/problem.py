@@ -254,7 +254,13 @@ def _clock_times(problem: Problem) -> Array:
     """(m,) time since the origin of the clocks at their nominal rates [s]."""
     origin = np.array([view.clock.origin_s for view in problem.views])
     rate = np.array([view.clock.rate for view in problem.views])
-    return rate[problem.view] * (problem.video_s - origin[problem.view])
+    filmed = problem.video_s
+    if any(view.clock.gaps for view in problem.views):
+        filmed = filmed.copy()
+        for number, view in enumerate(problem.views):
+            mine = problem.view == number
+            filmed[mine] = view.clock.filmed(filmed[mine])
+    return np.asarray(rate[problem.view] * (filmed - origin[problem.view]))
 
 
 def chains_at(problem: Problem, state: Unknowns) -> Indices:

@@ -16,6 +16,7 @@ from ..drag import Drag
 from ..picks import Picks
 from ..placement import check_placement
 from .deviations import Fit, with_covariance
+from .mending import mend
 from .result import Refinement, summarise
 from .search import Rival, search, search_one_by_one, solve_with_noise
 from .setup import Setup, prepare, set_up
@@ -148,8 +149,11 @@ def _solve(setup: Setup, alone: Callable[[str], Setup], loss: Loss, free: frozen
         )
     else:
         found = search(setup, state, loss, progress)
+    mended = mend(found, loss, progress)
+    if mended.faults:
+        found = replace(mended.found, rivals=())
     return with_covariance(
-        replace(setup, problem=found.problem, noise=found.noise), found.solution, [*rivals, *found.rivals]
+        replace(setup, problem=found.problem, noise=found.noise), found.solution, [*rivals, *found.rivals], mended
     )
 
 

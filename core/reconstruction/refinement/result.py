@@ -240,7 +240,7 @@ def _refined_views(views: tuple[View, ...], fit: Fit, *, posed: bool) -> tuple[V
     for i, view in enumerate(views):
         path, pose = view.path, columns.pose[i]
         clock = replace(
-            view.clock,
+            fit.setup.problem.views[i].clock,
             offset_s=view.clock.offset_s + float(state.offset_s[i]),
             drift=view.clock.drift + float(state.drift[i]),
         )

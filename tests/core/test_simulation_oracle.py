@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rockfall.core.constants import GRAVITY_MPS2 as G
+from rockfall.core.impact_models.registry import find_model
 from rockfall.core.simulation.engine import IMPACT, ON_GROUND, Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import make_releases, placed_on
@@ -183,3 +184,28 @@ def test_a_real_grid_of_5_m_gives_the_run_out_of_a_smooth_surface_through_it() -
         far.append(float(np.hypot(*(run.position - start)[:, :2].T).mean()))
     assert far[1] > 80.0
     assert far[0] == pytest.approx(far[1], rel=0.05)
+
+
+def test_an_impact_on_a_second_plane_is_recorded_as_it_was() -> None:
+    """A kink of 60°: x² (3 − 2 x), x = (60 − 45)/45, of the model's velocity and spin, the rest of the meeting's."""
+    turn, parameters = np.radians(60.0), {"rn": 0.3, "rt": 0.8}
+    up = np.array([np.sin(np.pi / 4), 0.0, np.cos(np.pi / 4)])
+    way = np.array([up[2], 0.0, -up[0]])
+    start = -4.0 * way + RADIUS * up + np.array([0.0, 1.9, 0.0])
+    releases = make_releases(start[None], velocity=(3.0 * way - 1e-4 * up)[None], diameter_m=2 * RADIUS)
+    settings = Settings("azimi_desvarreux_1977", parameters, friction=0.3)
+    records = simulate(make_ground(kinked(turn)), releases, settings).records
+    row = np.flatnonzero((records.what == IMPACT) & (records.time_s > 0.1))[0]
+    v, w, n = records.v1[row], records.omega1[row], records.normal[row]
+    model = find_model(settings.model)
+    numbers = model.parameter_type(*model.numbers(parameters))
+    draws = model.draw_type(*np.full(model.draws, np.nan))
+    hit, spun = (np.array(x) for x in model.function(tuple(v), tuple(n), tuple(w), RADIUS, 1.0, numbers, draws))
+    last = np.pi / 4 - turn
+    behind = np.array([np.cos(last), 0.0, -np.sin(last)])
+    rolls = (np.cos(turn) + 0.4) / 1.4 * np.linalg.norm(v) * behind
+    x = 1.0 / 3.0
+    part = x * x * (3.0 - 2.0 * x)
+    np.testing.assert_allclose(records.v2[row], rolls + part * (hit - rolls), atol=1e-3 * np.linalg.norm(v))
+    spin = np.cross(n, rolls) / RADIUS
+    np.testing.assert_allclose(records.omega2[row], spin + part * (spun - spin), atol=2e-3 * np.linalg.norm(w))

@@ -155,9 +155,10 @@ class Ground:
     def facets(self) -> Any:
         """What lies about each triangle, for blocks that roll, whatever their size: `across`, `bend`, `clear` and
         `lean` of `facet_kernels`; empty with points."""
-        across, bend, lean = self._linked()[:3]
+        across, bend, lean = self._linked[:3]
         return across, bend, np.zeros((len(across), 4), np.float32), lean
 
+    @cached_property
     def _linked(self) -> tuple[Any, Any, Any, Any, Any]:
         """See `facet_kernels.link`."""
         m = 0 if len(self.points) else len(self.faces)
@@ -183,7 +184,7 @@ class Ground:
         wanted = tuple(steps)
         found = self._at_steps.get(wanted)
         if found is None:
-            across, bend, _, excess, width = self._linked()
+            across, bend, _, excess, width = self._linked
             corners = self.index.corners if len(across) else np.empty((0, 3, 3))
             both = [at_scale(corners, (across, bend, excess, width), 2.0 ** (0.5 * one)) for one in wanted]
             found = np.stack([one for one, _ in both]), np.stack([one for _, one in both])

@@ -9,6 +9,8 @@ fillets     a slope of 40° onto the flat, rounded with the radius R by n edges.
             at one place at a time: its stop is that of the energy line. Below, it hits as in the sharp kink.
 crests      the convex likewise: a block takes off where v² > g cosβ (R + r).
 meshes      one smooth rough surface (36°, 14°, flat; waves of 3 m and more) as grids of several spacings.
+noise       a plane of 30° that runs out onto the flat, its points off at random: run-out, that without noise as long as
+            the noise is below the scale of the block.
 tiles       the demo site and scanned slopes as grids of several spacings: run-out, and speed and energy at a screen.
 thresholds  constants of the kernels halved and doubled: run-out and impacts on one of the meshes.
 
@@ -296,6 +298,37 @@ def meshes(options: argparse.Namespace) -> None:
             print(f"{model:<12}{diameter:>8.2f}m" + "".join(cells) + f"{max(means) / min(means):>12.3f}", flush=True)
 
 
+def noisy_ground(spacing: float, sigma: float, seed: int) -> Ground:
+    """30°, from x = 30 m on flat, with normal errors of the heights [m]."""
+    x, y = np.arange(0.0, 66.0 + spacing / 2, spacing), np.arange(0.0, 40.0 + spacing / 2, spacing)
+    steep = np.tan(np.radians(30.0))
+    z = steep * (2.0 * np.logaddexp(0.0, (x - 30.0) / 2.0) - x)
+    return make_ground(grid(x, y, z + np.random.default_rng(seed).normal(0.0, sigma, (y.size, x.size))))
+
+
+def noise(options: argparse.Namespace) -> None:
+    print(f"30° onto the flat, {options.blocks} blocks that start at 1 m/s, {options.law}, mu {options.friction[0]:g}:")
+    print("mean run-out in m (impacts a block, the first touch is one)")
+    print(f"{'model':<10}{'diameter':>9}{'spacing':>9}" + "".join(f"{f'{1000 * s:g} mm':>14}" for s in options.sigmas))
+    for spacing in options.spacings:
+        grounds = [noisy_ground(spacing, sigma, options.surface) for sigma in options.sigmas]
+        for model in options.models:
+            for diameter in options.diameters:
+                cells = []
+                for ground in grounds:
+                    places = np.random.default_rng(5).uniform([2, 17], [4, 23], (options.blocks, 2))
+                    centre = placed_on(ground, places, np.full(options.blocks, diameter))
+                    way = np.array([np.cos(np.radians(30)), 0.0, -np.sin(np.radians(30))])
+                    releases = make_releases(centre, velocity=np.tile(way, (options.blocks, 1)), diameter_m=diameter)
+                    settings = Settings(MODELS[model], rolling=options.law, friction=options.friction[0], seed=1)
+                    run = simulate(ground, releases, settings, record="ends", threads=1)
+                    out = np.hypot(*(run.position - releases.position)[:, :2].T)
+                    cells.append(f"{out.mean():>8.1f} ({run.impacts.mean():>3.1f})")
+                print(
+                    f"{model:<10}{diameter:>8.2f}m{spacing:>8.2f}m" + "".join(f"{one:>14}" for one in cells), flush=True
+                )
+
+
 # ------------------------------------------------------------------------------------------------------------- tiles
 
 TILES = {
@@ -437,10 +470,10 @@ def constants() -> dict[str, float]:
 
     import rockfall.core.simulation as package
 
-    wanted = ("HOP", "STEP", "FALL", "LINGERS", "SHARP", "GENTLE", "TURN", "BEND", "SAG")
+    wanted = ("HOP", "STEP", "FALL", "LEAST_STEP", "FREE", "GENTLE", "SLIGHT", "DISTINCT", "OWN", "WIDE", "NOISY")
     found = {}
     for one in pkgutil.iter_modules(package.__path__):
-        if one.name.endswith("_kernels"):
+        if one.name.endswith("_kernels") or one.name == "block_scale":
             module = importlib.import_module(f"{package.__name__}.{one.name}")
             found |= {name: getattr(module, name) for name in wanted if hasattr(module, name)}
     return found
@@ -452,8 +485,6 @@ def thresholds(options: argparse.Namespace) -> None:
     more = ["meshes", "--blocks", str(options.blocks), "--spacings", *map(str, options.spacings)]
     more += ["--models", *options.models, "--diameters", *map(str, options.diameters)]
     for name, value in [("none", 0.0), *((name, factor * there[name]) for name in names for factor in (0.5, 2.0))]:
-        if name == "SHARP":  # a cosine: what is halved is the angle
-            value = float(np.cos(np.arccos(there[name]) * value / there[name]))
         print(f"\n{name} = {value:g}" + (f" (is {there[name]:g})" if name != "none" else ""), flush=True)
         command = [sys.executable, "-c", CHILD, str(Path(__file__).parent), name, repr(value), *more]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -498,6 +529,15 @@ def parser() -> argparse.ArgumentParser:
     one.add_argument("--law", default="azzoni_1995")
     one.add_argument("--roughness", type=float, default=0.005, help="amplitude as a part of the wave length")
     one.add_argument("--surface", type=int, default=1, help="seed of the surface")
+    one = table("noise", noise)
+    one.add_argument("--spacings", **number, default=[0.05, 0.1, 0.2, 0.5])
+    one.add_argument("--sigmas", **number, default=[0.0, 0.002, 0.005, 0.01], help="[m]")
+    one.add_argument("--models", nargs="+", choices=list(MODELS), default=["azimi", "noel"])
+    one.add_argument("--diameters", **number, default=[0.3, 1.0])
+    one.add_argument("--blocks", type=int, default=20)
+    one.add_argument("--friction", **number, default=[0.35])
+    one.add_argument("--law", default="azzoni_1995")
+    one.add_argument("--surface", type=int, default=1, help="seed of the noise")
     one = table("tiles", tiles)
     one.add_argument("--tiles", nargs="+", choices=list(TILES), default=list(TILES))
     one.add_argument("--spacings", **number, default=[0.1, 0.25, 0.5, 1.0], help="multiples of 0.05 m")

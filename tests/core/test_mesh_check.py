@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a simulation says of its mesh: edges beside blocks, and the same blocks on a finer mesh of the same surface."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
@@ -17,15 +20,8 @@ from rockfall.core.workflow.mesh_check import change_remarks, mesh_changes, refi
 from rockfall.core.workflow.mesh_fineness import fineness, fineness_remarks
 from rockfall.core.workflow.simulation import Scenario, remarks_of
 
-
-def sheet(x: np.ndarray, y: np.ndarray, height) -> Surface:
-    x, y = np.meshgrid(x, y)
-    i = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = (part.ravel() for part in (i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]))
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    return Surface(
-        np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3), faces.astype(np.int32), GlobalShift(), "sheet"
-    )
+sys.path.insert(0, str(Path(__file__).parent))
+from sheets import sheet
 
 
 def rough(x, y):

@@ -44,15 +44,18 @@ def fall(ground: Ground) -> Simulation:
     return simulate(ground, make_releases(start, diameter_m=0.5), SETTINGS)
 
 
-def same(one: Simulation, other: Simulation) -> None:
-    """The same falls, but for what rounding grows to on the way down."""
+def same(one: Simulation, other: Simulation, alike: float = 1.0) -> None:
+    """The same falls, but for what rounding grows to on the way down: 2 mm when the start is moved by 1e-12 m.
+
+    alike : the part of the blocks of which that is true.
+    """
     np.testing.assert_array_equal(one.end, other.end)
     first = [np.flatnonzero((run.records.what == IMPACT) & (run.records.time_s < 1.5)) for run in (one, other)]
     assert len(first[0]) == len(first[1]) >= 60
     np.testing.assert_allclose(one.records.position[first[0]], other.records.position[first[1]], atol=1e-6)
     apart = np.linalg.norm(one.position - other.position, axis=1)
-    assert (apart < 0.05).mean() > 0.9
-    assert apart.max() < 1.0
+    assert (apart < 0.02).mean() >= alike
+    assert apart.max() < (0.02 if alike == 1.0 else 0.5)
 
 
 def texts(simulation: Simulation) -> list[str]:
@@ -104,7 +107,8 @@ def test_triangles_that_are_there_twice_are_met_as_one() -> None:
     )
     assert ground_faults(again).twice == 10
     run = fall(make_ground(again))
-    same(run, fall(make_ground(surface)))
+    # Edges of three triangles are none that a block is taken over: it rolls there in steps.
+    same(run, fall(make_ground(surface)), 0.95)
     assert "Triangles that are there twice: 10; blocks meet them as one." in texts(run)
 
 

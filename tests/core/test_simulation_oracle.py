@@ -4,32 +4,27 @@
 The simulator itself is held against closed forms first.
 """
 
+import csv
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rockfall.core.constants import GRAVITY_MPS2 as G
-from rockfall.core.georeference import GlobalShift
+from rockfall.core.impact_models.registry import find_model
 from rockfall.core.simulation.engine import IMPACT, ON_GROUND, Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import make_releases, placed_on
+from rockfall.core.terrain.readers import read_terrain
 from rockfall.core.terrain.surface import Surface
+from scipy.interpolate import RectBivariateSpline
 
 sys.path.insert(0, str(Path(__file__).parent))
+from sheets import sheet
 from simulation_oracle import Triangles, _foot, fall, fall_on_function
 
 RADIUS = 0.15
-
-
-def sheet(x: np.ndarray, y: np.ndarray, height) -> Surface:
-    x, y = np.meshgrid(x, y)
-    i = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = (part.ravel() for part in (i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]))
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    return Surface(
-        np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3), faces.astype(np.int32), GlobalShift(), "sheet"
-    )
+DATA = Path(__file__).parents[1] / "data"
 
 
 def triangles(surface: Surface) -> Triangles:
@@ -162,3 +157,55 @@ def test_a_block_that_touches_two_walls_of_a_ditch_rolls_along_it() -> None:
     plain = fall(gaps, start[0], velocity[0], RADIUS, parameters={"rn": 0.0, "rt": 1.0}, friction=0.2, most_s=2.0)
     assert np.linalg.norm(plain.position - start[0]) > 3.0
     np.testing.assert_allclose(run.position[0], plain.position, atol=0.03 * np.linalg.norm(plain.position - start[0]))
+
+
+def test_a_real_grid_of_5_m_gives_the_run_out_of_a_smooth_surface_through_it() -> None:
+    """Tschamut: blocks on the survey's grid, and on the bicubic spline through its nodes, sampled every 0.5 m."""
+    coarse = read_terrain(DATA / "tschamut_2014_terrain.asc")
+    v = coarse.vertices
+    x, y = np.unique(v[:, 0]), np.unique(v[:, 1])
+    z = np.empty((x.size, y.size))
+    z[np.searchsorted(x, v[:, 0]), np.searchsorted(y, v[:, 1])] = v[:, 2]
+    spline = RectBivariateSpline(x, y, z)
+    fine = sheet(np.arange(x[0], x[-1], 0.5), np.arange(y[0], y[-1], 0.5), lambda x, y: spline.ev(x, y))
+    with (DATA / "tschamut_2014_releases.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))[::2]
+    place, velocity = (
+        np.array([[float(row[name]) for name in names] for row in rows])
+        for names in (("x_m", "y_m"), ("vx_mps", "vy_mps", "vz_mps"))
+    )
+    size = np.full(len(rows), 0.35)
+    far = []
+    for surface in (coarse, fine):
+        ground = make_ground(surface)
+        start = placed_on(ground, place, size)
+        releases = make_releases(start, velocity=velocity, diameter_m=size)
+        run = simulate(ground, releases, Settings("azimi_desvarreux_1977", friction=0.46), record="ends")
+        far.append(float(np.hypot(*(run.position - start)[:, :2].T).mean()))
+    assert far[1] > 80.0
+    assert far[0] == pytest.approx(far[1], rel=0.05)
+
+
+def test_an_impact_on_a_second_plane_is_recorded_as_it_was() -> None:
+    """A kink of 60°: x² (3 − 2 x), x = (60 − 45)/45, of the model's velocity and spin, the rest of the meeting's."""
+    turn, parameters = np.radians(60.0), {"rn": 0.3, "rt": 0.8}
+    up = np.array([np.sin(np.pi / 4), 0.0, np.cos(np.pi / 4)])
+    way = np.array([up[2], 0.0, -up[0]])
+    start = -4.0 * way + RADIUS * up + np.array([0.0, 1.9, 0.0])
+    releases = make_releases(start[None], velocity=(3.0 * way - 1e-4 * up)[None], diameter_m=2 * RADIUS)
+    settings = Settings("azimi_desvarreux_1977", parameters, friction=0.3)
+    records = simulate(make_ground(kinked(turn)), releases, settings).records
+    row = np.flatnonzero((records.what == IMPACT) & (records.time_s > 0.1))[0]
+    v, w, n = records.v1[row], records.omega1[row], records.normal[row]
+    model = find_model(settings.model)
+    numbers = model.parameter_type(*model.numbers(parameters))
+    draws = model.draw_type(*np.full(model.draws, np.nan))
+    hit, spun = (np.array(x) for x in model.function(tuple(v), tuple(n), tuple(w), RADIUS, 1.0, numbers, draws))
+    last = np.pi / 4 - turn
+    behind = np.array([np.cos(last), 0.0, -np.sin(last)])
+    rolls = (np.cos(turn) + 0.4) / 1.4 * np.linalg.norm(v) * behind
+    x = 1.0 / 3.0
+    part = x * x * (3.0 - 2.0 * x)
+    np.testing.assert_allclose(records.v2[row], rolls + part * (hit - rolls), atol=1e-3 * np.linalg.norm(v))
+    spin = np.cross(n, rolls) / RADIUS
+    np.testing.assert_allclose(records.omega2[row], spin + part * (spun - spin), atol=2e-3 * np.linalg.norm(w))

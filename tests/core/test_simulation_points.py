@@ -360,7 +360,8 @@ def test_a_large_block_rides_over_what_stops_a_small_one() -> None:
         velocity = 2.0 * np.tile([np.cos(0.43), 0.0, -np.sin(0.43)], (20, 1))
         run = simulate(ground, make_releases(places, velocity=velocity, diameter_m=diameter), settings)
         far[diameter] = run.position[:, 0] - 5.0
-    assert np.median(far[0.3]) < 4
+    # A sphere on the function itself, by `simulation_oracle.fall_on_function`: 2.55 m. Points scatter about it.
+    assert np.median(far[0.3]) == pytest.approx(2.55, abs=0.5)
     assert (far[0.3] < 10).all()
     assert (far[3.0] > 30).all()
 

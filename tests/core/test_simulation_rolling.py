@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blocks on the ground that are taken over edges in closed form: what is near them, and the ways that they go."""
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from rockfall.core.constants import GRAVITY_MPS2
@@ -16,17 +19,10 @@ from rockfall.core.terrain.kernels import STACK_SIZE
 from rockfall.core.terrain.raycast import closest_points
 from rockfall.core.terrain.surface import Surface
 
+sys.path.insert(0, str(Path(__file__).parent))
+from sheets import sheet
+
 ROLLS = {"rn": 0.0, "rt": 1.0}
-
-
-def sheet(x: np.ndarray, y: np.ndarray, height) -> Surface:
-    x, y = np.meshgrid(x, y)
-    i = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = (part.ravel() for part in (i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]))
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    return Surface(
-        np.stack([x, y, height(x, y)], axis=-1).reshape(-1, 3), faces.astype(np.int32), GlobalShift(), "sheet"
-    )
 
 
 def needles(count: int, seed: int) -> Surface:

@@ -36,7 +36,9 @@ COVARIANCE = np.diag([2e-4, 2e-4, 2e-4, 0.03, 0.03, 0.03]) ** 2
 
 def places(time, gone=None):
     """(m, 3) of the ball's centre, and its velocities after and before each contact, (n − 1, 3) of the flights."""
-    centre = PLACE + np.array([0, 0, BLOCK.radius_m]) - np.outer(np.zeros(len(PLACE)) if gone is None else gone, [0, 0, 1])
+    centre = (
+        PLACE + np.array([0, 0, BLOCK.radius_m]) - np.outer(np.zeros(len(PLACE)) if gone is None else gone, [0, 0, 1])
+    )
     whole, way = np.diff(TIME), np.diff(centre, axis=0)
     leaving = way / whole[:, None] + np.outer(whole, [0, 0, 9.81 / 2])
     arriving = leaving - np.outer(whole, [0, 0, 9.81])

@@ -84,6 +84,8 @@ def _faults(fit: Fit) -> Iterator[Remark]:
         if fault.kind == "ground":
             node = int(problem.grounded[int(fault.at)])
             yield Remark(in_words(problem, fault, _pick(fit, node)), "warning", _trajectory(fit.setup, node))
+        elif fault.kind == "drag":
+            yield Remark(in_words(problem, fault, ""), "warning", "drag")
         elif fault.kind != "rate":
             yield Remark(in_words(problem, fault, ""), "warning", f"view {problem.views[fault.view].name}")
 

@@ -47,13 +47,13 @@ class Mended:
     ----------
     found : the fit.
     faults : in the order in which they were found.
-    otherwise : where the unknowns would be with another capture rate, which stays in the problem since it is a
-        person's to set; and with or without a fault that accelerations of the flights explain about as well.
+    otherwise : the solutions with another capture rate or drag, which stay in the problem since they are
+        a person's to set; and with or without a fault that accelerations of the flights explain about as well.
     """
 
     found: Found
     faults: tuple[Fault, ...] = ()
-    otherwise: tuple[Unknowns, ...] = ()
+    otherwise: tuple[Solution, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ class _Linear:
     ----------
     residual, jacobian : (rows,), (rows, q) sparse; of the pixels, the times of all nodes, the ground, and the rest.
     own : (q, q) the inverse of its normal equations.
-    root : (m,) of the pixels' weights; by_time (m, 2) their derivatives by time, without.
+    root : (m,) of the pixels' weights.
     spare : number of residuals of pixels beyond the unknowns.
     floor : least variance of the pixels, as they were stated.
     """
@@ -75,13 +75,12 @@ class _Linear:
     jacobian: "csr_array"
     own: Array
     root: Array
-    by_time: Array
     spare: float
     floor: float
 
     def columns(self, faults: Sequence[Fault]) -> Array:
         """(rows, c) of faults."""
-        columns = columns_of(self.problem, self.solution.state, self.by_time, faults)
+        columns = columns_of(self.problem, self.solution.state, self.solution.evaluation.pixels.jacobian, faults)
         m = self.root.size
         columns[: 2 * m] *= np.repeat(self.root, 2)[:, None]
         return np.concatenate([columns, np.zeros((self.residual.size - len(columns), columns.shape[1]))])
@@ -128,9 +127,8 @@ def _linear(problem: Problem, solution: Solution, noise: float) -> _Linear:
     cells = (np.concatenate(values), (np.concatenate(lines), np.concatenate(places)))
     jacobian = csr_array(cells, shape=(start, size))
     inverted = inverse((jacobian.T @ jacobian).toarray(), partly=True)
-    by_time = np.where(used[:, None], pixels.jacobian[:, :, CLOCK_COLUMN], 0.0)
     spare = max(2.0 * float(used.sum()) - size, 1.0)
-    return _Linear(problem, solution, np.concatenate(residuals), jacobian, inverted, root, by_time, spare, noise**-2.0)
+    return _Linear(problem, solution, np.concatenate(residuals), jacobian, inverted, root, spare, noise**-2.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +187,7 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
     ----------
     found : the fit as everything was given.
     """
-    faults, otherwise = list[Fault](), list[Unknowns]()
+    faults, otherwise = list[Fault](), list[Solution]()
     for _ in range(MOST):
         linear = _linear(found.problem, found.solution, found.noise)
         stated = _as_stated(found, loss)
@@ -212,10 +210,10 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
             break
         fault, mended, in_doubt = made
         faults.append(fault)
-        if fault.kind == "rate" or fault.doubtful:
-            return Mended(found, tuple(faults), (*otherwise, mended.solution.state))
+        if fault.kind in ("rate", "drag") or fault.doubtful:
+            return Mended(found, tuple(faults), (*otherwise, mended.solution))
         if in_doubt:
-            otherwise.append(found.solution.state)
+            otherwise.append(found.solution)
         found = mended
     return Mended(found, tuple(faults), tuple(otherwise))
 
@@ -279,8 +277,10 @@ def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault,
         gain += 0.5 * (_log_det(again.covariance) - 2 * fault.value.size * float(np.log(prior)))
     gain -= trial.rare
     rival = find_accelerations(found.problem, found.solution, found.noise)
-    against = 0.0 if rival is None else rival.gain - trial.rare  # accelerations are not taken for rare
-    if gain < max(ASKED_FOR, against * (BESIDE if fault.kind == "zoom" else 1.0)):
+    against = (
+        0.0 if rival is None or not rival.asked else rival.gain - trial.rare
+    )  # accelerations are not taken for rare
+    if gain < max(ASKED_FOR, against * (BESIDE if fault.kind in ("zoom", "drag") else 1.0)):
         return None
     fault = replace(fault, doubtful=gain < against)
     unscaled = replace(problem, sigma_px=problem.sigma_px / found.noise, ground=problem.ground.scaled(1.0, 1.0))

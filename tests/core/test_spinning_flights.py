@@ -79,7 +79,7 @@ def coverage(seed, sigma_px, *, told):
     """Relative errors of speeds after and before bounces, whether they are in their intervals, and the warnings."""
     rng = np.random.default_rng(seed)
     times, bounces, after, before, pieces = played(rng)
-    middle = bounces.mean(axis=0) + [0, 0, 0.2]
+    middle = bounces.mean(axis=0) + np.array([0, 0, 0.2])
     views, rows = [], []
     for number, away in enumerate(([0.6, -4.2, 1.6], [1.0, 4.4, 1.5])):
         camera = look_at(1280, 720, middle + away, middle, focal_px=1250.0)

@@ -22,6 +22,10 @@ SIZES_MPS2 = np.geomspace(0.03, 30.0, 31)
 """Standard deviations of the acceleration that are tried [m/s²]."""
 ASKED_FOR = 4.0
 """Logarithm of the ratio of likelihoods from which the accelerations are there."""
+LIFT = 0.35
+"""Coefficient of lift of a ball whose surface turns about as fast as it flies, as one that rolls (Nathan 2008)."""
+UNSEEN_PARTS = np.array([0.25, 0.5, 1.0])
+"""Of what the air may do to a block: accelerations that the pixels may not tell from none."""
 FREEDOM, REWEIGHTED = 2.0, 10
 """Degrees of freedom of Student's distribution of the flights' accelerations, and rounds of reweighting."""
 
@@ -91,22 +95,26 @@ def find_accelerations(problem: Problem, solution: Solution, noise: float) -> Ac
     variance *= max(1.0, float(np.mean(alike))) if alike else 1.0
 
     told, slope = told / variance, axes.T @ slope / variance
-    gain = [
-        float((0.5 * size_2 * slope**2 / (1 + size_2 * told) - 0.5 * np.log1p(size_2 * told)).sum())
-        for size_2 in SIZES_MPS2**2
-    ]
+    gain = _gains(told, slope, SIZES_MPS2)
     best = int(np.argmax(gain))
-    asked = gain[best] >= ASKED_FOR
+    asked = bool(gain[best] >= ASKED_FOR)
     if asked:
         mean, spread = _in_each_flight(axes @ (told[:, None] * axes.T), axes @ slope, float(SIZES_MPS2[best]))
     else:
-        mean, spread = np.zeros(told.size), _too_small_to_tell(axes, told, slope, np.array(gain))
+        mean, spread = np.zeros(told.size), _too_small_to_tell(axes, told, slope, _in_air(problem, solution))
     through = np.concatenate([drawn, np.eye(told.size)])
     found = np.zeros((len(problem.first), 3))
     found[flying] = mean.reshape(-1, 3)
     kept = tuple(replace(track, columns=track.columns[track.columns < size]) for track in tracks)
     return Accelerations(
-        wide, found, float(SIZES_MPS2[best]), through @ spread @ through.T, variance * own, kept, gain[best], asked
+        wide,
+        found,
+        float(SIZES_MPS2[best]),
+        through @ spread @ through.T,
+        variance * own,
+        kept,
+        float(gain[best]),
+        asked,
     )
 
 
@@ -129,15 +137,29 @@ def _in_each_flight(told: Array, slope: Array, size: float) -> tuple[Array, Arra
     return mean, covariance + np.outer(mean, mean)
 
 
-def _too_small_to_tell(axes: Array, told: Array, slope: Array, gain: Array) -> Array:
+def _gains(told: Array, slope: Array, sizes_mps2: Array) -> Array:
+    """(s,) logarithm of the ratio of likelihoods with accelerations of s sizes and without."""
+    size_2 = sizes_mps2[:, None] ** 2
+    return np.asarray((0.5 * size_2 * slope**2 / (1 + size_2 * told) - 0.5 * np.log1p(size_2 * told)).sum(axis=1))
+
+
+def _in_air(problem: Problem, solution: Solution) -> float:
+    """What the air does to blocks that spin as if they rolled, in the mean of the flights [m/s²]."""
+    pace = solution.evaluation.motion.start_velocity[~problem.contact]
+    lift = LIFT * problem.reference_drag[~problem.contact] * (pace**2).sum(axis=1)
+    return float(np.sqrt((lift**2).mean()))
+
+
+def _too_small_to_tell(axes: Array, told: Array, slope: Array, greatest_mps2: float) -> Array:
     """(3k, 3k) covariance of accelerations about none that the pixels do not ask for, but do not rule out either.
 
-    Each size as much as it is likely, and none at all as likely as all of them before.
+    There are none, or some of a part of the greatest, each as much as it is likely.
     """
-    weight = np.exp(np.minimum(gain, ASKED_FOR)) / gain.size
+    sizes = greatest_mps2 * UNSEEN_PARTS
+    weight = np.exp(np.minimum(_gains(told, slope, sizes), ASKED_FOR)) / sizes.size
     weight /= 1 + weight.sum()
     spread = np.zeros_like(axes)
-    for part, size_2 in zip(weight, SIZES_MPS2**2, strict=True):
+    for part, size_2 in zip(weight, sizes**2, strict=True):
         narrow = size_2 / (1 + size_2 * told)
         mean = axes @ (narrow * slope)
         spread += part * ((axes * narrow) @ axes.T + np.outer(mean, mean))

@@ -40,6 +40,17 @@ LEAST_RATE = 0.025
 
 
 @dataclass(frozen=True, eq=False)
+class Trial:
+    """A fault with the logarithm of its ratio of likelihoods, how rare it is, and the step of its size."""
+
+    fault: Fault
+    evidence: float
+    rare: float
+    step: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Mended:
     """A fit, and the faults that were taken out of its problem.
 
@@ -47,6 +58,7 @@ class Mended:
     ----------
     found : the fit.
     faults : in the order in which they were found.
+    unseen : contacts that may be off the ground although the pixels do not ask for it.
     otherwise : the solutions with another capture rate or drag, which stay in the problem since they are
         a person's to set; and with or without a fault that accelerations of the flights explain about as well.
     """
@@ -54,6 +66,7 @@ class Mended:
     found: Found
     faults: tuple[Fault, ...] = ()
     otherwise: tuple[Solution, ...] = ()
+    unseen: tuple[Trial, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,18 +144,7 @@ def _linear(problem: Problem, solution: Solution, noise: float) -> _Linear:
     return _Linear(problem, solution, np.concatenate(residuals), jacobian, inverted, root, spare, noise**-2.0)
 
 
-@dataclass(frozen=True, eq=False)
-class _Trial:
-    """A fault with the logarithm of its ratio of likelihoods, how rare it is, and the step of its size."""
-
-    fault: Fault
-    evidence: float
-    rare: float
-    step: Array
-    covariance: Array
-
-
-def _tried(linear: _Linear, faults: Sequence[Fault], count: int = 0) -> list[_Trial]:
+def _tried(linear: _Linear, faults: Sequence[Fault], count: int = 0) -> list[Trial]:
     """Each fault by itself.
 
     Parameters
@@ -154,7 +156,7 @@ def _tried(linear: _Linear, faults: Sequence[Fault], count: int = 0) -> list[_Tr
     through = linear.own @ across
     slope = -(columns.T @ linear.residual - through.T @ (linear.jacobian.T @ linear.residual))
     squares = float((linear.residual[:m2] ** 2).sum())
-    found, place = list[_Trial](), 0
+    found, place = list[Trial](), 0
     for fault in faults:
         own = slice(place, place + fault.value.size)
         place = own.stop
@@ -169,7 +171,7 @@ def _tried(linear: _Linear, faults: Sequence[Fault], count: int = 0) -> list[_Tr
         wide = np.linalg.slogdet(np.eye(fault.value.size) + sigma**2 * told)[1]
         rare = rarity(fault) + float(np.log(count or len(faults)))
         evidence = 0.5 * float(asked @ step) - 0.5 * float(wide) - rare
-        found.append(_Trial(fault, evidence, rare, step, covariance))
+        found.append(Trial(fault, evidence, rare, step, covariance))
     return found
 
 
@@ -187,15 +189,17 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
     ----------
     found : the fit as everything was given.
     """
-    faults, otherwise = list[Fault](), list[Solution]()
+    faults, otherwise, unseen = list[Fault](), list[Solution](), list[Trial]()
     for _ in range(MOST):
         linear = _linear(found.problem, found.solution, found.noise)
         stated = _as_stated(found, loss)
-        ahead = list[_Trial]()
+        ahead = list[Trial]()
         for group in candidates(found.problem, found.solution.state):
             on_ground = group[0].kind == "ground" and stated is not found
             about = _linear(stated.problem, stated.solution, stated.noise) if on_ground else linear
-            best = max(_tried(about, group), key=lambda one: one.evidence)
+            trials = _tried(about, group)
+            unseen = trials if group[0].kind == "ground" else unseen
+            best = max(trials, key=lambda one: one.evidence)
             if best.fault.kind == "gap":
                 near = [g for g in gaps(found.problem, best.fault.view, best.fault.at) if g.picks == best.fault.picks]
                 best = max(_tried(linear, near, len(group)), key=lambda one: one.evidence)
@@ -211,11 +215,14 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
         fault, mended, in_doubt = made
         faults.append(fault)
         if fault.kind in ("rate", "drag") or fault.doubtful:
-            return Mended(found, tuple(faults), (*otherwise, mended.solution))
+            otherwise.append(mended.solution)
+            break
         if in_doubt:
             otherwise.append(found.solution)
         found = mended
-    return Mended(found, tuple(faults), tuple(otherwise))
+    known = {fault.at for fault in faults if fault.kind == "ground"}
+    unseen = [one for one in unseen if one.evidence < ASKED_FOR and one.fault.at not in known]
+    return Mended(found, tuple(faults), tuple(otherwise), tuple(unseen))
 
 
 def _is_as_stated(problem: Problem) -> bool:
@@ -233,7 +240,7 @@ def _as_stated(found: Found, loss: Loss) -> Found:
     return replace(found, problem=problem, solution=solve(problem, found.solution.state, loss))
 
 
-def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault, Found, bool] | None:
+def _without(found: Found, at: Found, trial: Trial, loss: Loss) -> tuple[Fault, Found, bool] | None:
     """The fit without a fault; None where the squares do not fall by as much as they should.
 
     Parameters
@@ -337,20 +344,27 @@ def _jump(problem: Problem, solution: Solution, fault: Fault) -> float:
     return float(problem.video_s[rows[split]])
 
 
-def spread_of_faults(problem: Problem, solution: Solution, covariance: Array, faults: Sequence[Fault]) -> Array:
-    """(size, c) by how much the unknowns move with the numbers of faults that were taken out: S with S Sᵀ.
+def spread_of_faults(problem: Problem, solution: Solution, covariance: Array, mended: Mended) -> Array:
+    """(size, c) by how much the unknowns move with the numbers of faults that were taken out, and of those that may be
+    there unseen, each as much as it is likely: S with S Sᵀ.
 
     Parameters
     ----------
     covariance : (size, size) of the unknowns without.
     """
-    sized = [fault for fault in faults if fault.kind in ("gap", "zoom")]
+    sized = [fault for fault in mended.faults if fault.kind in ("gap", "zoom")]
     size = problem.columns.size
-    if not sized:
-        return np.zeros((size, 0))
     linear = _linear(problem, solution, 1.0)
+    parts = [np.zeros((size, 0))]
+    if mended.unseen:
+        odds = np.exp([one.evidence for one in mended.unseen])
+        away = np.array([float(one.step[0]) ** 2 + float(one.covariance[0, 0]) for one in mended.unseen])
+        across = np.asarray(linear.jacobian.T @ linear.columns([one.fault for one in mended.unseen]))
+        parts.append(-covariance @ across[:size] * np.sqrt(odds / (1 + odds.sum()) * away))
+    if not sized:
+        return np.concatenate(parts, axis=1)
     columns = linear.columns(sized)
     across = np.asarray(linear.jacobian.T @ columns)
     known = np.concatenate([np.full(fault.value.size, prior_sigma(problem, fault) ** -2) for fault in sized])
     own = np.linalg.inv(columns.T @ columns - across.T @ linear.own @ across + np.diag(known))
-    return np.asarray(-covariance @ across[:size] @ np.linalg.cholesky(own))
+    return np.concatenate([*parts, -covariance @ across[:size] @ np.linalg.cholesky(own)], axis=1)

@@ -16,7 +16,8 @@ from .views import View
 NODE = 4
 """Unknowns of a node: x, y, z of the block's centre [m] and the time [s]."""
 DRAG_COLUMN, LAW_COLUMN, POSE_COLUMNS, CLOCK_COLUMN = 8, 9, slice(10, 16), 16
-"""Of the pixels' derivatives: by the drag coefficient, gravity, the view's pose and its clock's offset, there even when these are held."""
+"""Of the pixels' derivatives: by the drag coefficient, gravity, the view's pose and its clock's offset, there even when
+these are held."""
 SHORTEST_S = 1e-4
 """A segment does not become shorter than this."""
 

@@ -12,8 +12,9 @@ from ...vectors import Array, Mask, dot, norm, unit
 from ..triangulation import GRAZING_DEG
 from .assumptions import on_assumptions
 from .contact_pixels import while_landed
-from .deviations import Fit
+from .deviations import Fit, velocity_rows
 from .faults import in_words
+from .mending import unseen_ground
 from .problem import CLOCK_COLUMN, NODE, solve_segments
 from .setup import Ground, Setup
 from .solver import normal_equations
@@ -31,6 +32,8 @@ MANY = 0.1
 IN_A_ROW = 5
 """Outliers one after the other: the motion between two picks is another one, as when an impact is missing."""
 MOST_TIMES = 3
+GONE_M = 0.3
+"""What may be gone of the ground at a contact since it was scanned, for which it is said where it passes unseen."""
 UNLIKELY = 0.05
 """Chance below which another solution is not spoken of."""
 
@@ -73,6 +76,7 @@ def remarks_on(
             *_open_ends(fit),
             *_off_centre(fit),
             *_grazing(fit),
+            *_unseen_ground(fit),
         ]
     return (*remarks, *(remark for remark in late if remark.severity != "warning"))
 
@@ -250,6 +254,28 @@ def _grazing(fit: Fit) -> Iterator[Remark]:
             "place rests on the flights beside it."
         )
         yield Remark(text, "note", _trajectory(setup, nodes[i]))
+
+
+def _unseen_ground(fit: Fit) -> Iterator[Remark]:
+    """That a change of the ground at one contact could not be noticed, where it could not."""
+    unseen = () if fit.mended is None else fit.mended.unseen
+    if not unseen:
+        return
+    problem, motion = fit.setup.problem, fit.solution.evaluation.motion
+    least, moved = unseen_ground(problem, fit.solution, fit.independent, unseen)
+    if float(np.median(least)) < GONE_M:
+        return
+    flying, change = np.flatnonzero(~problem.contact), list[Array]()
+    for at_end, velocity in ((False, motion.start_velocity[flying]), (True, motion.end_velocity[flying])):
+        slope = velocity_rows(problem, motion, flying, at_end=at_end)[:, :, : len(moved)] @ moved
+        change.append(np.einsum("ki,kic->kc", unit(velocity), slope) / norm(velocity)[:, None])
+    most = GONE_M * np.abs(np.concatenate(change)).max(axis=0)
+    text = (
+        f"{_who(fit.setup)}: these views do not test the ground at a single contact: what it is off by passes unseen "
+        f"below about {float(np.median(least)):.1f} m, and {GONE_M:g} m would change a speed beside it by "
+        f"{100 * float(np.median(most)):.1f} %. A second side does."
+    )
+    yield Remark(text, "note", fit.setup.names[0] if len(fit.setup.names) == 1 else "")
 
 
 def _late_views(fit: Fit) -> Iterator[Remark]:

@@ -35,6 +35,8 @@ BESIDE = 0.5
 """What explains so much of what another cause does, by the logarithms of their likelihoods, is not ruled out by it."""
 AS_STATED = 1.5
 """One contact alone is off the ground where the terrain is by no more than so many times what was stated elsewhere."""
+POWER = 0.84
+"""So many standard deviations beyond the threshold an error is found four times in five."""
 LEAST_RATE = 0.025
 """A capture rate that is wrong is so by more than this part."""
 
@@ -344,6 +346,25 @@ def _jump(problem: Problem, solution: Solution, fault: Fault) -> float:
     return float(problem.video_s[rows[split]])
 
 
+def _moved_by(linear: _Linear, covariance: Array, faults: Sequence[Fault]) -> Array:
+    """(size, c) by how much the unknowns move with each number of faults."""
+    across = np.asarray(linear.jacobian.T @ linear.columns(faults))
+    return np.asarray(-covariance @ across[: len(covariance)])
+
+
+def unseen_ground(
+    problem: Problem, solution: Solution, covariance: Array, unseen: Sequence[Trial]
+) -> tuple[Array, Array]:
+    """What the ground at single contacts may be off by without being noticed, four times in five (c,) [m], and by how
+    much the unknowns move with a metre of it (size, c): Baarda's internal and external reliability (1968)."""
+    told = np.array([1 / one.covariance[0, 0] for one in unseen]) - np.array(
+        [prior_sigma(problem, one.fault) ** -2 for one in unseen]
+    )
+    asked = np.sqrt(2 * (ASKED_FOR + np.array([one.rare for one in unseen])))
+    least = (asked + POWER) / np.sqrt(np.maximum(told, 1e-12))
+    return least, _moved_by(_linear(problem, solution, 1.0), covariance, [one.fault for one in unseen])
+
+
 def spread_of_faults(problem: Problem, solution: Solution, covariance: Array, mended: Mended) -> Array:
     """(size, c) by how much the unknowns move with the numbers of faults that were taken out, and of those that may be
     there unseen, each as much as it is likely: S with S Sᵀ.
@@ -359,8 +380,8 @@ def spread_of_faults(problem: Problem, solution: Solution, covariance: Array, me
     if mended.unseen:
         odds = np.exp([one.evidence for one in mended.unseen])
         away = np.array([float(one.step[0]) ** 2 + float(one.covariance[0, 0]) for one in mended.unseen])
-        across = np.asarray(linear.jacobian.T @ linear.columns([one.fault for one in mended.unseen]))
-        parts.append(-covariance @ across[:size] * np.sqrt(odds / (1 + odds.sum()) * away))
+        moved = _moved_by(linear, covariance, [one.fault for one in mended.unseen])
+        parts.append(moved * np.sqrt(odds / (1 + odds.sum()) * away))
     if not sized:
         return np.concatenate(parts, axis=1)
     columns = linear.columns(sized)

@@ -13,7 +13,7 @@ from .options import figure_formats, whole
 from .progress import PrintedProgress, stopped_by_interrupt
 
 if TYPE_CHECKING:
-    from ..workflow.back_analysis import BackAnalysis
+    from ..analysis.back_analysis import BackAnalysis
 
 SETS, ROUNDS = 2000, 3
 VARIANTS = 64

@@ -46,12 +46,12 @@ def run(arguments: argparse.Namespace) -> int:
     """Do it all, say what comes out, and list the files."""
     from ..analysis.statistics import impact_statistics
     from ..analysis.truth import compare_with_truth, read_truth, truth_sentences
-    from ..exchange.opening import open_project
     from ..exchange.project import read_project
     from ..film.job import FilmJob
     from ..film.maker import film_maker
     from ..output import output_folder
     from ..reconstruction.summary import summarise
+    from ..workflow.opening import open_project
 
     maker = None if arguments.no_film else film_maker()  # what is missing is told before the work, not after
     project = read_project(SITE / "project.toml")

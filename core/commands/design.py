@@ -92,15 +92,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate, find what barriers must have, write the page."""
-    from ..exchange.design_page import write_design
-    from ..exchange.opening import read_project_picks, reconstruct_project
     from ..exchange.partial_factors import USUAL, open_factors
     from ..exchange.project import read_project
     from ..exchange.screens import write_screens
-    from ..exchange.simulation_project import open_simulation
     from ..output import output_folder
+    from ..workflow.design_page import write_design
     from ..workflow.design_sheet import design_sheet
     from ..workflow.enough import as_many_as
+    from ..workflow.opening import read_project_picks, reconstruct_project
+    from ..workflow.scenarios import open_simulation
     from ..workflow.simulation import ground_of
 
     if arguments.most is not None and (arguments.number is not None or not arguments.until_known):

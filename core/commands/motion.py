@@ -12,10 +12,10 @@ from .progress import PrintedProgress
 
 if TYPE_CHECKING:
     from ..analysis.motion_graphs import FrameScale, MotionCourse
-    from ..exchange.footage import Footage
     from ..exchange.project import Project
     from ..reconstruction.picks import Picks
     from ..terrain.surface import Surface
+    from ..workflow.footage import Footage
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,10 +35,10 @@ def run(arguments: argparse.Namespace) -> int:
     from ..analysis.motion_figures import save_motion_figures
     from ..analysis.motion_graphs import QUANTITIES, motion_courses
     from ..exchange.motion_tables import write_motion, write_track_residuals
-    from ..exchange.opening import open_terrain, read_project_picks, reconstruct_project
     from ..exchange.project import read_project
     from ..extras import FIGURES, install_command, is_there
     from ..output import output_folder
+    from ..workflow.opening import open_terrain, read_project_picks, reconstruct_project
     from ..workflow.refinement import pixels_of
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.project):
@@ -95,7 +95,7 @@ def _chosen(picks: "Picks", names: list[str] | None) -> "Picks":
 
 def _footage(project: "Project", surface: "Surface | None", picks: "Picks") -> "Footage | None":
     """What was tracked of these trajectories; None where no video has both a camera and a track."""
-    from ..exchange.footage import name_trajectory, open_footage
+    from ..workflow.footage import name_trajectory, open_footage
 
     if not any(video.camera is not None and video.track is not None for video in project.videos):
         return None

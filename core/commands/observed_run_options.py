@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..constants import GRAVITY_MPS2, ROCK_DENSITY_KGPM3
 from ..errors import InputError
+from .motion_options import motion_as_asked, stated_or_asked
 from .options import (
     OF_PROJECT,
     add_figure_options,
@@ -29,7 +30,7 @@ from .options import (
 )
 from .progress import PrintedProgress
 from .release_options import add_zone_options, zones_as_asked
-from .tree_options import add_tree_options, trees_said
+from .tree_options import add_tree_options
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -143,10 +144,10 @@ def _of_project(
 ) -> ObservedCase:
     """The measured runs of a project; options replace what it says."""
     from ..analysis.completeness import parse_completeness
-    from ..exchange.opening import reconstruct_project
     from ..exchange.project import read_project
     from ..exchange.simulation_entry import TABLE, ReleaseEntry
-    from ..exchange.simulation_project import open_simulation, placed_source
+    from ..workflow.opening import reconstruct_project
+    from ..workflow.scenarios import open_simulation, placed_source
     from ..workflow.simulation import ground_of
     from ..workflow.whole_runs import measured_runs
 
@@ -158,14 +159,7 @@ def _of_project(
     project = read_project(file)
     entry = project.stated_simulation
     entry = replace(
-        entry,
-        models=models_as_asked(names, entry.models),
-        releases=ReleaseEntry(),
-        rolling=arguments.rolling or entry.rolling,
-        friction=entry.friction if arguments.friction is None else arguments.friction,
-        drag=arguments.drag or entry.drag,
-        seed=entry.seed if arguments.seed is None else arguments.seed,
-        trees=trees_said(arguments, entry.trees),
+        stated_or_asked(arguments, entry), models=models_as_asked(names, entry.models), releases=ReleaseEntry()
     )
     scenario, inputs = open_simulation(replace(project, simulation=entry), file, progress)
     known = model_parameters(arguments, list(scenario.models), scenario.models)
@@ -201,54 +195,41 @@ def _of_table(
     from ..exchange.project import terrain_inputs
     from ..exchange.simulation_tables import read_releases
     from ..exchange.tables import read_picks
-    from ..exchange.trees import open_trees
-    from ..exchange.whole_run_tables import stopped_runs
     from ..impact_models.registry import COMPARED, find_model
     from ..reconstruction.block import Block
-    from ..reconstruction.drag import Drag
     from ..reconstruction.trajectory import reconstruct
     from ..simulation.blocks import block_of
     from ..simulation.measured_releases import from_reconstruction
-    from ..workflow.simulation import Scenario, ground_of
-    from ..workflow.whole_runs import measured_runs
+    from ..workflow.scenarios import make_scenario
+    from ..workflow.simulation import ground_of
+    from ..workflow.whole_runs import measured_runs, stopped_runs
 
     if not arguments.terrain:
         raise InputError("--terrain is missing", advice="Only a project, project.toml, can do without it")
-    models = [find_model(name) for name in models_as_asked(names, COMPARED)]
-    parameters = model_parameters(arguments, [model.name for model in models])
-    given = {name: getattr(arguments, name) for name in ("rolling", "friction") if getattr(arguments, name) is not None}
-    gravity = GRAVITY_MPS2 if arguments.gravity is None else arguments.gravity
+    models = models_as_asked(names, COMPARED)
+    parameters = model_parameters(arguments, models)
     diameter = DIAMETER_M if arguments.diameter is None else arguments.diameter
     density = ROCK_DENSITY_KGPM3 if arguments.density is None else arguments.density
     surface = terrain_as_asked(arguments, arguments.terrain, progress)
-    zones, zone_files = zones_as_asked(arguments, surface, [model.name for model in models])
-    entry = trees_said(arguments)
-    trees, tree_files = (None, {}) if entry is None else open_trees(entry, surface, arguments.seed or 0)
+    zones, zone_files = zones_as_asked(arguments, surface, models)
     progress(f"Reading {arguments.table}")
     blocks = block_of("sphere", diameter, diameter, diameter, density)
 
     def placed(file: str) -> "ReleaseSource":
         return partial(read_releases, file, blocks=blocks, number=number)
 
-    scenario = Scenario(
-        surface,
-        placed(arguments.table),
-        {model.name: parameters.get(model.name, {}) for model in models},
-        zones=zones,
-        trees=trees,
-        drag=Drag() if arguments.drag else None,
-        gravity_mps2=gravity,
-        seed=arguments.seed or 0,
-        **given,
+    motion = motion_as_asked(arguments, models)
+    scenario, tree_files = make_scenario(
+        *motion, surface, placed(arguments.table), parameters, zones=zones, progress=progress
     )
     inputs = {"observed": Path(arguments.table), **terrain_inputs(arguments.terrain), **zone_files, **tree_files}
-    drawing = [model.name for model in models if model.draws_from_impacts]
+    drawing = [name for name in models if find_model(name).draws_from_impacts]
     ground, stated = ground_of(scenario), parse_completeness(arguments.completeness or "")
     made_of = partial(
         reconstruct,
         surface=surface,
         block=Block(diameter, diameter, diameter, density),
-        gravity_mps2=gravity,
+        gravity_mps2=scenario.gravity_mps2,
         drag=scenario.drag,
         flights=flights or "contacts",
     )
@@ -291,9 +272,8 @@ def _with_more(
     placed : the blocks of a table of releases.
     """
     from ..exchange.tables import read_picks
-    from ..exchange.whole_run_tables import stopped_runs
     from ..impact_models.registry import find_model
-    from ..workflow.whole_runs import ObservedRuns, join_runs, measured_runs
+    from ..workflow.whole_runs import ObservedRuns, join_runs, measured_runs, stopped_runs
 
     if arguments.more_stops:
         _refuse_drawing([name for name in case.scenario.models if find_model(name).draws_from_impacts])

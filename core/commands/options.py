@@ -341,10 +341,10 @@ def impacts_as_asked(file: str) -> "Impacts":
     ------
     RockfallError : see `read_impacts` and `open_project`.
     """
-    from ..exchange.opening import open_project
     from ..exchange.project import read_project
     from ..exchange.saved_blend import is_project
     from ..exchange.tables import read_impacts
+    from ..workflow.opening import open_project
 
     if not is_project(file):
         return read_impacts(file)

@@ -99,10 +99,10 @@ def _prepare_places() -> "Surface":
 
 
 def _prepare_tables() -> None:
-    from ..exchange.opening import open_project
     from ..exchange.project import read_project
     from ..exchange.tables import read_impacts, write_impacts, write_trajectories
     from ..reconstruction.sampling import STEP_S, sample_trajectories
+    from ..workflow.opening import open_project
 
     surface, result = open_project(read_project(SITE / "project.toml"))
     with TemporaryDirectory(prefix="rockfall-") as folder:

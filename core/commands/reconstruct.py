@@ -160,8 +160,8 @@ def _of_table(arguments: argparse.Namespace, progress: PrintedProgress) -> _Made
 
 def _of_project(arguments: argparse.Namespace, progress: PrintedProgress) -> _Made:
     """As a project says."""
-    from ..exchange.opening import open_project
     from ..exchange.project import read_project
+    from ..workflow.opening import open_project
 
     parser = argparse.ArgumentParser()
     add_arguments(parser)

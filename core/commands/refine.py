@@ -16,12 +16,13 @@ from .options import add_out, known_names, naming, not_negative, positive
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
-    from ..exchange.footage import Footage
     from ..exchange.project import Project, RefinementSettings
     from ..reconstruction.impact import Impacts
     from ..reconstruction.picks import Picks
+    from ..reconstruction.refinement.reliability import Statement
     from ..reconstruction.refinement.what_if import WhatIf
     from ..terrain.surface import Surface
+    from ..workflow.footage import Footage
     from ..workflow.refinement import Refined
 
 MOST_ROWS = 20
@@ -51,6 +52,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "are the centre's (default: as the project says, else 0.15)",
     )
     parser.add_argument(
+        "--sigma-datum",
+        type=not_negative,
+        metavar="PART",
+        help="standard deviation of how the cameras lie to the terrain beside their covariance, in parts of the "
+        "distance; 0: they are of one survey (default: as the project says, else 0.0014)",
+    )
+    parser.add_argument(
         "--sigma-terrain",
         type=positive,
         metavar="M",
@@ -71,10 +79,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Refine, write the tables and the refined project, print the summary."""
-    from ..exchange.footage import name_trajectory, open_footage
-    from ..exchange.opening import blocks_of, drag_of, open_terrain
     from ..exchange.project import read_project
     from ..output import output_folder
+    from ..workflow.footage import name_trajectory, open_footage
+    from ..workflow.opening import blocks_of, drag_of, open_terrain
     from ..workflow.refinement import refine_picks
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.project):
@@ -97,6 +105,7 @@ def run(arguments: argparse.Namespace) -> int:
             free=how.free,
             sigma_terrain_m=how.sigma_terrain_m or (project.terrain.sigma_m if project.terrain else None),
             sigma_aim=how.sigma_aim,
+            sigma_datum=how.sigma_datum,
             loss=cast(Loss, how.loss),
             site=project.site.name,
             progress=progress,
@@ -113,15 +122,17 @@ def _settings(settings: "RefinementSettings", arguments: argparse.Namespace) -> 
     """As the project says, but for what was typed."""
     free = settings.free if arguments.free is None else known_names(arguments.free, FREE, "--free")
     aim = settings.sigma_aim if arguments.sigma_aim is None else arguments.sigma_aim
+    datum = settings.sigma_datum if arguments.sigma_datum is None else arguments.sigma_datum
     terrain = arguments.sigma_terrain or settings.sigma_terrain_m
-    return replace(settings, free=free, loss=arguments.loss or settings.loss, sigma_aim=aim, sigma_terrain_m=terrain)
+    loss = arguments.loss or settings.loss
+    return replace(settings, free=free, loss=loss, sigma_aim=aim, sigma_datum=datum, sigma_terrain_m=terrain)
 
 
 def _picks(project: "Project", surface: "Surface | None", footage: "Footage") -> tuple["Picks", tuple[str, ...]]:
     """The project's picks, or first ones from what was seen; with a sentence about these."""
-    from ..exchange.footage import picks_from_footage
-    from ..exchange.opening import read_project_picks
     from ..exchange.tables import read_picks
+    from ..workflow.footage import picks_from_footage
+    from ..workflow.opening import read_project_picks
 
     if project.picks is not None:
         if surface is None:
@@ -149,7 +160,7 @@ def _write(
 ) -> list[str]:
     """Write all files; returns their names."""
     from ..exchange.cameras import write_camera
-    from ..exchange.footage_tables import write_refinement_residuals, write_what_if
+    from ..exchange.footage_tables import write_refinement_residuals, write_reliability, write_what_if
     from ..exchange.project import write_project
     from ..exchange.saved_blend import keep_files
     from ..exchange.tables import write_impacts, write_picks, write_trajectories
@@ -171,7 +182,8 @@ def _write(
         outlier=fit.outlier,
     )
     write_what_if(fit.what_if, folder / "what_if.csv")
-    written = ["picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv", "what_if.csv"]
+    write_reliability(fit.statements, folder / "reliability.csv")
+    written = ["picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv", "what_if.csv", "reliability.csv"]
     entries = {}
     for i, (video, view) in enumerate(zip(footage.videos, fit.views, strict=True)):
         entry, camera, covariance = video.entry, video.camera, refined.pose_covariance[i]
@@ -238,7 +250,8 @@ def _summary(refined: "Refined") -> list[str]:
         )
     sentences += [f"{name}: {value:.6g} ± {sigma:.2g}" for name, (value, sigma) in fit.unknowns.items()]
     impacts = _impact_lines(fit.reconstruction.impacts)
-    return [*sentences, *impacts, *_what_if_lines(fit.what_if), *map(str, refined.remarks)]
+    tables = [*_what_if_lines(fit.what_if), *_reliability_lines(fit.statements)]
+    return [*sentences, *impacts, *tables, *map(str, refined.remarks)]
 
 
 def _what_if_lines(rows: Sequence["WhatIf"]) -> list[str]:
@@ -247,7 +260,21 @@ def _what_if_lines(rows: Sequence["WhatIf"]) -> list[str]:
 
     if not rows:
         return []
-    cells = [("what if", "speeds, median", "at most", "R, median", "at most"), *(row.cells for row in gravest(rows))]
+    return _table(
+        [("what if", "speeds, median", "at most", "R, median", "at most"), *(one.cells for one in gravest(rows))]
+    )
+
+
+def _reliability_lines(rows: Sequence["Statement"]) -> list[str]:
+    """How large errors of what is stated may be unnoticed, as a table for people: the worst of each kind."""
+    from ..reconstruction.refinement.reliability import worst
+
+    if not rows:
+        return []
+    return _table([("not detectable below", "size", "speeds, median", "at most"), *(one.cells for one in worst(rows))])
+
+
+def _table(cells: Sequence[tuple[str, ...]]) -> list[str]:
     width = max(len(row[0]) for row in cells)
     return [f"{row[0]:<{width}}" + "".join(f"  {cell:>14}" for cell in row[1:]) for row in cells]
 

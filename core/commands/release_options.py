@@ -14,9 +14,10 @@ if TYPE_CHECKING:
     from ..simulation.blocks import Blocks
     from ..simulation.ground import Ground
     from ..simulation.release import Releases
+    from ..simulation.zones import Zones
     from ..terrain.cloud import Cloud
     from ..terrain.surface import Surface
-    from ..workflow.simulation import ReleaseSource, Zones
+    from ..workflow.simulation import ReleaseSource
 
 DIAMETER = "0.35"
 SOURCES = ("RELEASES", "--from-line", "--from-polygon", "--steeper-than", "--from-impacts")

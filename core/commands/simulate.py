@@ -162,8 +162,8 @@ def _with_checked_mesh(work: Work, progress: PrintedProgress) -> Work:
 def _simulate_here(arguments: argparse.Namespace, work: Work, folder: Path, progress: PrintedProgress) -> Done:
     """Simulate in this process, and write the tables into the folder."""
     from ..exchange.simulation_geopackage import GEOPACKAGE, write_simulation_geopackage
-    from ..exchange.simulation_output import write_simulations
     from ..remarks import gravest_first
+    from ..workflow.simulation_output import write_simulations
 
     mapped, asked = _fallen(arguments, work, progress)
     remarks = gravest_first(_remarks(mapped, work))
@@ -182,9 +182,9 @@ def _simulate_here(arguments: argparse.Namespace, work: Work, folder: Path, prog
 def _fallen(arguments: argparse.Namespace, work: Work, progress: PrintedProgress) -> "tuple[Mapped, int]":
     """The runs of all models, with their maps and what passed at screens; what is finished at an interrupt, and the
     number of its signal."""
-    from ..exchange.simulation_output import recorded_for
     from ..workflow.maps import Mapped, map_models
     from ..workflow.simulation import run_models
+    from ..workflow.simulation_output import recorded_for
 
     scenario, record = work.scenario, recorded_for(work.record, bool(work.scenario.structures))
     with stopped_by_interrupt(progress, keeps=True) as counted:

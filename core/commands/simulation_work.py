@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import InputError
+from .motion_options import motion_as_asked, stated_or_asked
 from .options import (
     OF_PROJECT,
     known_names,
@@ -22,7 +23,6 @@ from .options import (
 )
 from .progress import PrintedProgress
 from .release_options import blocks_as_asked, blocks_said, releases_as_asked, sources_given, zones_as_asked
-from .tree_options import trees_said
 
 if TYPE_CHECKING:
     from ..hazard.screens import Screen
@@ -86,9 +86,9 @@ def work_as_asked(arguments: argparse.Namespace, progress: PrintedProgress) -> W
     """
     from ..exchange.saved_blend import is_project
     from ..exchange.simulation_entry import RECORDS
-    from ..exchange.simulation_output import default_records
     from ..workflow.enough import in_chance_order
     from ..workflow.simulation import ground_of
+    from ..workflow.simulation_output import default_records
 
     record = None if arguments.record is None else known_names(arguments.record, RECORDS, "--record")
     prepare = _project if is_project(arguments.releases or "") else _scenario
@@ -130,10 +130,8 @@ def _screens(
 def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> Asked:
     """What the options say."""
     from ..exchange.project import terrain_inputs
-    from ..exchange.trees import open_trees
-    from ..reconstruction.drag import Drag
     from ..terrain.readers import read_structure, read_tile_points
-    from ..workflow.simulation import Scenario
+    from ..workflow.scenarios import make_scenario
 
     for option in ("terrain", "model"):
         if not getattr(arguments, option):
@@ -143,13 +141,6 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> Asked
     draws = _posteriors(arguments, models)
     measured = measured_as_asked(arguments, models, needed=True)
     files = _structures(arguments.structure)
-    given = {
-        name: getattr(arguments, option)
-        for option, name in (
-            ("rolling", "rolling"), ("friction", "friction"), ("gravity", "gravity_mps2"), ("seed", "seed"),
-        )
-        if getattr(arguments, option) is not None
-    }  # fmt: skip
     source, release_files = releases_as_asked(arguments)
     reading = reading_as_asked(arguments)
     if arguments.contact == "points":
@@ -159,19 +150,16 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> Asked
     else:
         terrain = terrain_as_asked(arguments, arguments.terrain, progress)
     zones, zone_files = zones_as_asked(arguments, terrain, models)
-    entry = trees_said(arguments)
-    trees, tree_files = (None, {}) if entry is None else open_trees(entry, terrain, arguments.seed or 0)
-    scenario = Scenario(
+    scenario, tree_files = make_scenario(
+        *motion_as_asked(arguments, models),
         terrain,
         source,
-        {name: parameters.get(name, {}) for name in models},
-        measured,
+        parameters,
+        measured=measured,
         structures={name: read_structure(file, reading, progress=progress) for name, file in files.items()},
         zones=zones,
-        drag=Drag() if arguments.drag else None,
         draws=draws,
-        trees=trees,
-        **given,
+        progress=progress,
     )
     inputs = {
         **_posterior_inputs(arguments.posterior),
@@ -188,10 +176,10 @@ def _scenario(arguments: argparse.Namespace, progress: PrintedProgress) -> Asked
 
 def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> Asked:
     """A project, in which options replace what its [simulation] says."""
-    from ..exchange.opening import reconstruct_project
     from ..exchange.project import read_project
-    from ..exchange.simulation_project import open_simulation
     from ..terrain.surface import Surface
+    from ..workflow.opening import reconstruct_project
+    from ..workflow.scenarios import open_simulation
 
     own = ["--terrain", "--structure", "--gravity", "--zone-attribute", "--spin", "--evenly"]
     for option in (*own, *sources_given(arguments)[1:]):
@@ -215,16 +203,11 @@ def _project(arguments: argparse.Namespace, progress: PrintedProgress) -> Asked:
             said |= {"proportions": blocks.proportions, "shape": blocks.shape}
         releases = replace(releases, **said)
     entry = replace(
-        entry,
+        stated_or_asked(arguments, entry),
         models=models_as_asked(arguments.model, entry.models),
         releases=releases,
         contact=arguments.contact or entry.contact,
-        rolling=arguments.rolling or entry.rolling,
-        friction=entry.friction if arguments.friction is None else arguments.friction,
-        drag=arguments.drag or entry.drag,
         observed=entry.observed if arguments.observed is None else Path(arguments.observed),
-        seed=entry.seed if arguments.seed is None else arguments.seed,
-        trees=trees_said(arguments, entry.trees),
     )
     scenario, inputs = open_simulation(replace(project, simulation=entry), file, progress)
     known = model_parameters(arguments, list(scenario.models), scenario.models)

@@ -8,7 +8,8 @@ from .options import add_out, naming
 from .progress import PrintedProgress
 
 if TYPE_CHECKING:
-    from ..workflow.spins import FlightSpin, MeasuredSpins
+    from ..reconstruction.flight_spins import FlightSpin
+    from ..workflow.spins import MeasuredSpins
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,11 +24,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure the spins, write the tables, print the summary."""
-    from ..exchange.opening import open_terrain, read_project_picks, reconstruct_project
     from ..exchange.project import read_project
-    from ..exchange.spin_tables import read_marked_videos, write_spins
+    from ..exchange.spin_tables import write_spins
     from ..exchange.tables import write_impacts, write_picks
     from ..output import output_folder
+    from ..workflow.footage import read_marked_videos
+    from ..workflow.opening import open_terrain, read_project_picks, reconstruct_project
     from ..workflow.spins import measure_spins, with_spins
 
     with output_folder(arguments.out) as folder, PrintedProgress() as progress, naming(arguments.project):
@@ -63,7 +65,7 @@ def _summary(spins: "MeasuredSpins") -> list[str]:
 
 
 def _measured(flight: "FlightSpin") -> str:
-    from ..workflow.spin_marks import AXIS_WORDS
+    from ..reconstruction.spin_marks import AXIS_WORDS
 
     if flight.spin is None:
         return "not known."

@@ -14,8 +14,8 @@ from .progress import PrintedProgress, stopped_by_interrupt
 from .simulation_work import Work
 
 if TYPE_CHECKING:
-    from ..exchange.chunk_store import ChunkStore
     from ..remarks import Remark
+    from ..workflow.chunk_store import ChunkStore
 
 CHUNKS = ".chunks"
 """Ends the name of the folder beside the output in which finished chunks are kept until all are."""
@@ -68,9 +68,7 @@ def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path,
     ------
     RockfallError : no workers, or not the right ones; the disk is full.
     """
-    from ..exchange.simulation_chunks import simulate_in_chunks, write_chunk_tables
     from ..exchange.simulation_geopackage import GEOPACKAGE, write_simulation_geopackage
-    from ..exchange.simulation_output import write_all_maps, write_met_trees
     from ..exchange.simulation_tables import summary, write_summary
     from ..interrupts import Interrupt
     from ..output import final_path
@@ -80,6 +78,8 @@ def simulate_on_workers(arguments: argparse.Namespace, work: Work, folder: Path,
     from ..workflow.maps import map_remarks
     from ..workflow.screens import outside_remarks, screen_remarks
     from ..workflow.simulation import check_models, remarks_of
+    from ..workflow.simulation_chunks import simulate_in_chunks, write_chunk_tables
+    from ..workflow.simulation_output import write_all_maps, write_met_trees
 
     scenario = work.scenario
     check_models(work.ground, scenario.settings)

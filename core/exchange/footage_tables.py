@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables of pixels (clicks.csv, track.csv, events.csv) and of a refinement (residuals.csv, what_if.csv)."""
+"""Tables of pixels (clicks.csv, track.csv, events.csv) and of a refinement (residuals.csv, what_if.csv,
+reliability.csv)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -10,9 +11,10 @@ import numpy as np
 from ..errors import InputError
 from ..reading import reader
 from ..reconstruction.picks import KINDS
+from ..reconstruction.refinement.reliability import Statement
 from ..reconstruction.refinement.what_if import WhatIf
+from ..reconstruction.sightings import Events, Sightings
 from ..vectors import Array, Indices, Mask, Names
-from ..workflow.sightings import Events, Sightings
 from .csv_text import TextTable, read_table
 from .tables import Columns, vector_columns, write_columns
 
@@ -207,6 +209,18 @@ def write_what_if(rows: Sequence[WhatIf], path: str | Path) -> None:
     text, numbers = names[:3], names[3:]
     columns: Columns = {name: [getattr(row, name) for row in rows] for name in text}
     write_columns(path, columns | {name: np.array([getattr(row, name) for row in rows]) for name in numbers})
+
+
+def write_reliability(rows: Sequence[Statement], path: str | Path) -> None:
+    """Write reliability.csv: a row for each error of a statement and each trajectory."""
+    text = ("about", "error", "trajectory", "unit")
+    columns: Columns = {name: [getattr(row, name) for row in rows] for name in text}
+    for name in ("found", "sigma", "w", "critical", "noticed"):
+        columns[name] = np.array([getattr(row, name) for row in rows])
+    columns["beyond"] = ["1" if row.beyond else "0" for row in rows]
+    for name in ("speed_percent", "most_speed_percent"):
+        columns[name] = np.array([getattr(row, name) for row in rows])
+    write_columns(path, columns)
 
 
 def _names(table: TextTable, name: str) -> Names:

@@ -15,9 +15,9 @@ from ..progress import Progress, silent
 from ..terrain.cloud import Cloud
 from ..terrain.surface import Surface
 from ..vectors import Array
-from ..workflow.map_figures import save_map_figures
 from .geopackage import FeatureLayer, write_geopackage
 from .geotiff_maps import write_map
+from .map_figures import save_map_figures
 from .qgis_styles import hatch_style, write_raster_style
 
 EVIDENCE = "evidence.gpkg"

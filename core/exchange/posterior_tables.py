@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.back_analysis import BackAnalysis
 from ..analysis.posterior_checks import doubts_of
 from ..errors import InputError
 from ..impact_models.registry import find_model
@@ -18,7 +19,6 @@ from ..output import write_text
 from ..reading import reader
 from ..remarks import from_plain, to_plain
 from ..simulation.parameter_draws import ParameterDraws, check_draws
-from ..workflow.back_analysis import BackAnalysis
 from .csv_text import read_table
 from .simulation_tables import inputs_with_digests
 from .tables import write_columns

@@ -17,7 +17,7 @@ from ..georeference import GlobalShift
 from ..output import final_path, write_text
 from ..reading import reader
 from ..reconstruction.block import SHAPES
-from ..reconstruction.choices import FLIGHT_ENDS, FREE, LOSSES, SIGMA_AIM
+from ..reconstruction.choices import FLIGHT_ENDS, FREE, LOSSES, SIGMA_AIM, SIGMA_DATUM
 from ..terrain.crs import metric_name
 from ..terrain.opening import HowToRead
 from .saved_blend import BLEND, project_of
@@ -168,12 +168,14 @@ class RefinementSettings:
     free : what is fitted beside the picks, of `FREE`.
     sigma_terrain_m : accuracy of the terrain [m]; None for that of `TerrainSource`.
     sigma_aim : standard deviation of the tracked spot about the block's centre, in parts of its diameter.
+    sigma_datum : of how the cameras lie to the terrain, in parts of the distance.
     loss : one of `LOSSES`, how pixels that do not fit count.
     """
 
     free: tuple[str, ...] = ()
     sigma_terrain_m: float | None = None
     sigma_aim: float = SIGMA_AIM
+    sigma_datum: float = SIGMA_DATUM
     loss: str = "huber"
     extra: Extra = field(default_factory=dict)
 
@@ -447,6 +449,7 @@ def _refinement(table: TomlTable) -> RefinementSettings:
         free=table.choices("free", FREE),
         sigma_terrain_m=table.optional_number("sigma_terrain_m"),
         sigma_aim=table.number("sigma_aim", SIGMA_AIM, zero_allowed=True),
+        sigma_datum=table.number("sigma_datum", SIGMA_DATUM, zero_allowed=True),
         loss=table.choice("loss", LOSSES, "huber"),
         extra=table.rest(),
     )

@@ -7,19 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
-from ..georeference import GlobalShift
 from ..reading import reader
-from ..reconstruction.refinement.views import View
-from ..terrain.surface import Surface
+from ..reconstruction.flight_spins import FlightSpin
+from ..reconstruction.spin_marks import AXES, AXIS_WORDS, SpinMarks
 from ..vectors import Array, Indices, Names
-from ..workflow.spin_marks import AXES, AXIS_WORDS, MarkedVideo, SpinMarks
-from ..workflow.spins import FlightSpin
 from .csv_text import read_table
-from .footage import clock_of
 from .footage_tables import PIXEL, frames_of, positive_of, whole_numbers
-from .opening import read_project_camera
-from .project import Project
 from .tables import Columns, vector_columns, write_columns
 
 MARKS_REQUIRED = ("trajectory", "time_s", *PIXEL)
@@ -84,38 +77,6 @@ def write_spin_marks(marks: SpinMarks, path: str | Path) -> None:
     if np.isfinite(marks.about).any():
         columns[COUNTED] = marks.about
     write_columns(path, columns)
-
-
-def read_marked_videos(
-    project: Project, surface: Surface | None, shift: GlobalShift | None = None
-) -> tuple[tuple[MarkedVideo, ...], tuple[str, ...]]:
-    """The videos of a project in which spins were marked, and sentences on what was done to their cameras.
-
-    Parameters
-    ----------
-    surface : the project's terrain, in whose frame the cameras are.
-    shift : of the local frame where there is no terrain (the picks').
-
-    Raises
-    ------
-    InputError : none has a camera and marks, or one of the files is bad.
-    """
-    found, notes = [], []
-    for entry in project.videos:
-        if entry.spin_marks is None:
-            continue
-        if entry.camera is None:
-            raise InputError(
-                f"Video {entry.name} has marks of spins, but no camera", advice='Align it, and name its camera = "…"'
-            )
-        camera, turned = read_project_camera(entry.camera, surface, shift)
-        notes += [f"{entry.name}: {note}" for note in turned]
-        marks = read_spin_marks(entry.spin_marks)
-        clock = clock_of(entry, marks.frame, marks.time_s)
-        found.append(MarkedVideo(View(entry.name, camera.path, clock, entry.row_time_s, camera.pose_covariance), marks))
-    if not found:
-        raise InputError("No video of the project has marks of spins", advice=SPIN_MARKS_ADVICE)
-    return tuple(found), tuple(notes)
 
 
 def write_spins(flights: Sequence[FlightSpin], path: str | Path) -> None:

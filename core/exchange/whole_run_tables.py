@@ -12,8 +12,6 @@ from ..errors import InputError
 from ..reading import reader
 from ..simulation.ground import Ground
 from ..simulation.release import Releases
-from ..workflow.simulation import ReleaseSource
-from ..workflow.whole_runs import ObservedRuns
 from .csv_text import read_table
 from .map_shapes import read_lines
 from .tables import Columns, write_columns, write_tables
@@ -80,12 +78,6 @@ def read_stops(path: str | Path, releases: Releases, ground: Ground) -> Observed
     start = releases.position[rows]
     start = start - releases.radius_m[rows][:, None] * [0.0, 0.0, 1.0]
     return observe_stops(names, start, stop, releases.mass_kg[rows])
-
-
-def stopped_runs(ground: Ground, source: ReleaseSource, stops: str | Path) -> ObservedRuns:
-    """Blocks of which it is known where they started and stopped; see `read_stops`."""
-    releases = source(ground)
-    return ObservedRuns(read_stops(stops, releases, ground), releases)
 
 
 def write_whole_runs(comparison: WholeRuns, path: str | Path) -> None:

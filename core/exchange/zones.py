@@ -19,13 +19,12 @@ from ..impact_models.registry import MODELS, find_model
 from ..reading import reader
 from ..remarks import Remark
 from ..simulation.ground import element_places
-from ..simulation.zones import ZoneCover, face_values, nearest_values, zones_of_values, zones_within
+from ..simulation.zones import ZoneCover, Zones, face_values, nearest_values, zones_of_values, zones_within
 from ..terrain.cloud import Cloud
 from ..terrain.opening import HowToRead
 from ..terrain.ply_attributes import PlyAttribute, read_ply_attributes
 from ..terrain.surface import Surface
 from ..vectors import Array
-from ..workflow.simulation import Zones
 from .csv_text import read_table
 from .map_shapes import polygon_of, read_polygons
 from .tables import Columns, write_columns

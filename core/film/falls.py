@@ -5,9 +5,9 @@ from dataclasses import replace
 
 from ..exchange.project import Project
 from ..exchange.simulation_entry import ReleaseEntry
-from ..exchange.simulation_project import open_simulation
 from ..progress import Progress, silent
 from ..simulation.engine import Simulation
+from ..workflow.scenarios import open_simulation
 from ..workflow.simulation import run_scenario
 from .job import FilmJob
 from .simulated import check_number

@@ -9,13 +9,13 @@ import numpy as np
 
 from ..camera.path import CameraPath, camera_at
 from ..errors import RockfallError
-from ..exchange.opening import read_project_camera
 from ..exchange.project import Project
 from ..film.composed.photographs import Photograph
 from ..footage.video import open_video, read_frame
 from ..progress import Progress, silent
 from ..terrain.surface import Surface
 from ..vectors import Array
+from ..workflow.opening import read_project_camera
 
 FRAMES = 5
 """Of a video; what moves in it is gone in their median."""

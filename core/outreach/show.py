@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..exchange.opening import open_project
 from ..exchange.project import Project, Site, read_project
 from ..film.composed.falls import Fall, Hits, measured_falls, simulated_falls
 from ..film.composed.ground import FROM_FOOTAGE, TerrainColours, coloured
@@ -25,6 +24,7 @@ from ..simulation.engine import ENDS, STOPPED, Simulation
 from ..simulation.measured_releases import start_times
 from ..terrain.surface import Surface
 from ..vectors import Array
+from ..workflow.opening import open_project
 from ..workflow.simulation import remarks_of
 from .photographs import Filmed, photographs_of, project_videos
 

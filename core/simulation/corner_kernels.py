@@ -22,6 +22,8 @@ WALL, UPRIGHT = 0.7854, 1.5708
 """From 45° on the second plane is met more and more as the impact model has it, from 90° on entirely [rad]."""
 STRAIGHT = 1e-7
 """Sine of the angle between two planes that are one."""
+AROUND_CORNER = 3.0
+"""So many edges are between two triangles with a corner in common."""
 FUZZY = 0.0873
 """By so much the normals turn that are fitted to points [rad], 5°, for their noise."""
 
@@ -29,6 +31,12 @@ FUZZY = 0.0873
 @kernel
 def angle_between(n, m):  # type: ignore[no-untyped-def]
     return acos(min(max(dot(n, m), -1.0), 1.0))
+
+
+@kernel
+def between(a, b, part):  # type: ignore[no-untyped-def]
+    """From a vector to another."""
+    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2])
 
 
 @kernel
@@ -56,6 +64,12 @@ def met(v, n, m, inertia, part):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def beyond_noise(turn, noise):  # type: ignore[no-untyped-def]
+    """Which part of a turn [rad] is none of a noise: √(1 − (noise/turn)²), or 0."""
+    return sqrt(1.0 - (noise / turn) ** 2) if turn > noise else 0.0
+
+
+@kernel
 def _have_a_corner_in_common(corners, i, j):  # type: ignore[no-untyped-def]
     for k in range(3):
         for e in range(3):
@@ -65,27 +79,32 @@ def _have_a_corner_in_common(corners, i, j):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def share_of_crease(facets, corners, i, j, v, n):  # type: ignore[no-untyped-def]
+def share_of_crease(facets, corners, i, j, v, n, turn):  # type: ignore[no-untyped-def]
     """Which part of a turn of the normal from triangle i to j is a crease of the surface, 0 to 1.
 
-    It is that of the edge between both; where they have a corner in common alone, of the edges of triangle i that v
-    crosses; and 1 where they have none: the contact has jumped over what is between.
+    It is that of the edge between both. Else the contact has jumped over what is between: all but the noise of the
+    bends around, and, where both have a corner in common, but what as many edges bend as are between there, each as
+    those of triangle i that v crosses. Of a triangle and itself it is the part of its bends.
     """
-    across, bend, _, _, crease = facets
-    bends = creases = 0.0
+    across, bend, _, curvature, crease, _ = facets
+    bends = creases = weights = 0.0
     if not _have_a_corner_in_common(corners, i, j):
-        return 1.0
+        return beyond_noise(turn, curvature[i, 3])
     for e in range(3):
         if bend[i, e] == 0.0:
             continue
-        turn, part = abs(bend_angle(bend[i, e])), abs(crease[i, e])
+        angle, part = abs(bend_angle(bend[i, e])), abs(crease[i, e])
         if across[i, e] == j:
-            return part / turn
+            return part / angle
         along = minus(corner(corners, i, (e + 1) % 3), corner(corners, i, e))
         crossing = dot(v, cross(along, n))
         weight = crossing * crossing / dot(along, along)
-        bends, creases = bends + weight * turn, creases + weight * part
-    return min(creases / bends, 1.0) if bends > 0.0 else 1.0
+        bends, creases, weights = bends + weight * angle, creases + weight * part, weights + weight
+    if bends == 0.0:
+        return 1.0
+    if i == j:
+        return min(creases / bends, 1.0)
+    return beyond_noise(turn, max(curvature[i, 3], AROUND_CORNER * max(bends - creases, 0.0) / weights))
 
 
 @kernel

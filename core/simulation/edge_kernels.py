@@ -14,7 +14,7 @@ import numpy as np
 
 from ..compiled import borrowing as kernel
 from .contact_kernels import first_root
-from .corner_kernels import met, share_of_crease
+from .corner_kernels import angle_between, met, share_of_crease
 from .facet_kernels import GENTLE, NOWHERE, convexity, corner, dot, is_clear, minus, upward
 from .leg_kernels import AT_ANOTHER, ON_TRIANGLE
 
@@ -89,7 +89,7 @@ def onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, inerti
     if j < 0 or facets[1][place, edge] > GENTLE:
         return v, n, place, AT_ANOTHER
     m = upward(tree[3], j)
-    share = share_of_crease(facets, tree[3], place, j, v, n)
+    share = share_of_crease(facets, tree[3], place, j, v, n, angle_between(n, m))
     turned = met(v, n, m, inertia, share * share)
     speed = sqrt(dot(turned, turned))
     if speed == 0.0 or not _within(tree, facets, j, p, m, radius, place):
@@ -108,13 +108,12 @@ def onto(tree, facets, p, v, n, place, edge, radius, gravity, factor, mu, inerti
 
 
 @kernel
-def _take_off(tree, facets, stack, p, v, n, m, place, j, t, radius, gravity, wide):  # type: ignore[no-untyped-def]
+def _take_off(tree, facets, stack, contact, p, v, m, place, j, t, gravity, wide):  # type: ignore[no-untyped-def]
     """Whether a block that flies off over an edge is above the triangle j beyond it after a time, and meets no other.
 
     m : the normal of j. wide : the radius and how far it is above the ground.
     """
     q = _foot(tree[3], j, _in_flight(p, v, gravity, t)[0], m)
-    contact = (p[0] - radius * n[0], p[1] - radius * n[1], p[2] - radius * n[2])
     return (
         is_clear(tree, stack, facets, place, contact, contact, 0.0, wide)
         and is_clear(tree, stack, facets, j, contact, q, 0.125 * gravity * t * t, wide)
@@ -138,8 +137,25 @@ def keeps(facets, corners, i, j, v, n, m, radius, gravity, hop):  # type: ignore
     bends = 0.5 * (convexity(facets, i, v) + convexity(facets, j, v))
     if bends * (square - pull * radius) > pull * square:
         return False
-    crossing = dot(v, m) * share_of_crease(facets, corners, i, j, v, n)
+    crossing = dot(v, m) * share_of_crease(facets, corners, i, j, v, n, angle_between(n, m))
     return crossing * crossing <= 2.0 * pull * hop
+
+
+@kernel
+def _on_surface(facets, corners, i, edge, p, v, n, m, radius):  # type: ignore[no-untyped-def]
+    """Centre and velocity of a block that comes to an edge of triangle i, beyond which the normal is m, as they are on
+    the surface that the triangles are samples of."""
+    share = share_of_crease(facets, corners, i, facets[0][i, edge], v, n, angle_between(n, m))
+    part = facets[5][i, edge] * (1.0 - share)
+    k = (n[0] + part * (m[0] - n[0]), n[1] + part * (m[1] - n[1]), n[2] + part * (m[2] - n[2]))
+    size = sqrt(dot(k, k))
+    k = (k[0] / size, k[1] / size, k[2] / size)
+    way = _along(v, k)
+    s = sqrt(dot(v, v) / dot(way, way))
+    return (
+        (p[0] + radius * (k[0] - n[0]), p[1] + radius * (k[1] - n[1]), p[2] + radius * (k[2] - n[2])),
+        (s * way[0], s * way[1], s * way[2]),
+    )
 
 
 @kernel
@@ -156,39 +172,40 @@ def turns_about(tree, facets, i, e, v, radius, gravity):  # type: ignore[no-unty
     share = (
         1.0
         if min(min(facets[0][i, 0], facets[0][i, 1]), facets[0][i, 2]) < 0
-        else share_of_crease(facets, corners, i, i, v, m)
+        else share_of_crease(facets, corners, i, i, v, m, 0.0)
     )
     return share * share * dot(v, v) <= gravity * max(e[2], 0.0) * radius
 
 
 @kernel
-def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, hop, shortest):  # type: ignore[no-untyped-def]
+def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, hop):  # type: ignore[no-untyped-def]
     """Over an edge beyond which the ground falls: about it, or in a hop.
 
     Parameters
     ----------
     factor, mu : part of gravity that accelerates; coefficient of friction.
     hop : [m] how high above the ground it may rise.
-    shortest : [s] a hop that takes no longer is none.
 
     Returns
     -------
     t, p, way : [s]; the centre after it, on the ground; the direction of the velocity.
-    n, place : of the ground there; −1 where it flies off, with the time from which on it has left the ground; and, with
-        a time of 0, where steps have to follow.
+    n, place : of the ground there; −1 where it flies off, with p and way of where it does, and the time from which on
+        it has left the ground; and, with a time of 0, where steps have to follow.
     """
     corners, across, bend = tree[3], facets[0], facets[1]
     j = np.int64(across[place, edge])
     if j < 0 or bend[place, edge] < -GENTLE or dot(v, v) == 0.0:
         return 0.0, p, v, n, -1
     m = upward(corners, j)
-    cosine, rises, fall = dot(m, n), dot(v, m), gravity * m[2]
-    height = radius * (cosine - 1.0)
+    contact = (p[0] - radius * n[0], p[1] - radius * n[1], p[2] - radius * n[2])
+    start, before = p, v
+    stays = keeps(facets, corners, place, j, v, n, m, radius, gravity, hop)
+    if not stays:
+        p, v = _on_surface(facets, corners, place, edge, p, v, n, m, radius)
+    rises, fall = dot(v, m), gravity * m[2]
+    height = dot(minus(p, corner(corners, j, 0)), m) - radius
     square = rises * rises + 2.0 * fall * height
-    if keeps(facets, corners, place, j, v, n, m, radius, gravity, hop) or (
-        square <= 0.0 or rises + sqrt(square) <= fall * shortest
-    ):
-        contact = (p[0] - radius * n[0], p[1] - radius * n[1], p[2] - radius * n[2])
+    if stays or square <= 0.0:
         wide = radius + hop
         if not (
             is_clear(tree, stack, facets, place, contact, contact, 0.0, wide)
@@ -196,14 +213,14 @@ def over(tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu,
         ):
             return 0.0, p, v, n, -1
         q = (contact[0] + radius * m[0], contact[1] + radius * m[1], contact[2] + radius * m[2])
-        way = minus(q, p)
+        way = minus(q, start)
         ds, square = sqrt(dot(way, way)), dot(v, v)
         if square <= 2.0 * factor * gravity * (way[2] + mu * n[2] * ds):
             return 0.0, p, v, n, -1  # it comes to rest on the edge
-        return ds / sqrt(square), q, _along(v, m), m, j
+        return ds / sqrt(square), q, _along(before, m), m, j
     if square > 2.0 * fall * hop:
         t = (rises - sqrt(square - fall * hop)) / fall  # when it is half a hop high
-        good = _take_off(tree, facets, stack, p, v, n, m, place, j, t, radius, gravity, radius + hop)
+        good = _take_off(tree, facets, stack, contact, p, v, m, place, j, t, gravity, radius + hop)
         return t if good else 0.0, p, v, n, -1
     total, came = 0.0, place
     for _ in range(MOST_PASSED):

@@ -23,6 +23,7 @@ from ..plausibility import GREATEST_SEED
 from ..progress import Progress, silent
 from ..reconstruction.drag import Drag
 from ..vectors import Array, Indices, Mask
+from .block_scale import step_of
 from .ground import Ground
 from .memory import check_records
 from .parameter_draws import FRICTION_NAME, ParameterDraws, check_draws
@@ -261,7 +262,8 @@ def simulate(
     from .record_kernels import COLUMNS, in_turn
 
     progress("Compiling where needed, then simulating", 0, n)
-    facets, stems = ground.facets, in_cells(settings.trees)
+    scales, scale = np.unique(step_of(releases.radius_m), return_inverse=True)
+    facets, stems = ground.facets_at(scales.tolist()), in_cells(settings.trees)
     run_blocks = _compiled_runs(tree, facets, stems)
     columns = (
         releases.position, releases.velocity, releases.angular_velocity, releases.radius_m, releases.mass_kg,
@@ -277,9 +279,9 @@ def simulate(
         """The records of some runs, one run after the other: in these rows, or in more of them; and how many."""
         ended = np.empty((part.size, 7))
         rows, count = run_blocks(
-            tree, facets, zone, model.compiled, numbers, friction, own[part], model.draws, part, runs[part],
-            settings.seed, *(column[part] for column in blocks), settings.gravity_mps2, law, settings.most_impacts,
-            settings.most_s, level, stems, ended, rows,
+            tree, facets, scale[part], zone, model.compiled, numbers, friction, own[part], model.draws, part,
+            runs[part], settings.seed, *(column[part] for column in blocks), settings.gravity_mps2, law,
+            settings.most_impacts, settings.most_s, level, stems, ended, rows,
         )  # fmt: skip
         results[part] = ended
         return rows, count
@@ -427,9 +429,9 @@ def _compiled_for(tree_type: Any, facets_type: Any, stems_type: Any) -> Any:
     run_blocks.disable_compile(False)
     run_blocks.compile(
         numba_types.Tuple((lines, types.int64))(
-            tree_type, facets_type, types.int32[::1], rebound_type(), lines, line, types.intp[::1], whole,
-            types.intp[::1], types.int64[::1], whole, *block, number, whole, whole, number, whole, stems_type, lines,
-            lines,
+            tree_type, facets_type, types.intp[::1], types.int32[::1], rebound_type(), lines, line, types.intp[::1],
+            whole, types.intp[::1], types.int64[::1], whole, *block, number, whole, whole, number, whole, stems_type,
+            lines, lines,
         )
     )  # fmt: skip
     run_blocks.disable_compile()

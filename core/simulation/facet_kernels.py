@@ -1,16 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What lies about each triangle, for a block that rolls or slides on it: compiled kernels.
 
-It is kept in a tuple `facets` of five, in the order of the leaves: the triangle across each edge (m, 3), from corner
-e to e + 1, −1 where a block is not taken over it; the bend there (m, 3), tan(θ/2) of the angle θ by which the ground
-rises beyond, negative where it falls; what a sphere is clear of (m, 4), which is looked up when a block is first on
-the triangle; the curvature (m, 3) [1/m] of the surface of which the triangles are samples, xx, xy and yy of a quadratic
-form in the horizontal parts of a direction; and the crease (m, 3) [rad], the part of each bend that is a sharp edge.
+It is kept in a tuple `facets` of six, in the order of the leaves:
+
+- the triangle across each edge (m, 3), from corner e to e + 1, −1 where a block is not taken over it;
+- the bend there (m, 3), tan(θ/2) of the angle θ by which the ground rises beyond, negative where it falls;
+- what a sphere is clear of (m, 4), which is looked up when a block is first on the triangle;
+- the curvature (m, 4) [1/m] of the surface of which the triangles are samples, xx, xy and yy of a quadratic form in the
+  horizontal parts of a direction, and the noise of the bends around [rad];
+- the crease (m, 3) [rad], the part of each bend that is a sharp edge;
+- the lean (m, 3), how much of each bend the surface has turned at the edge itself, by the mean normals of its ends.
+
+Curvature and crease are those of the surface at the scale of the block: see `block_scale`.
 
 An edge is a crease as far as it bends more than the mesh around does. The normals of the corners opposite the edge
 (means over the triangles around) lean by a and b from those of their triangles: by θ/2 each on a sampled arc, by
-nothing at an edge between two planes. So the crease is √(θ² − 4 (a² + b²)), or 0; of a crest `SLIGHT` to `DISTINCT`, a
-part of it. The rest of the bend is curvature.
+nothing at an edge between two planes. So the crease is √(θ² − 4 (a² + b²) − ν²), or 0, with the noise ν of the bends
+around; of a crest `SLIGHT` to `DISTINCT`, a part of it. The rest of the bend is curvature.
 
 What a sphere is clear of is
 
@@ -92,19 +98,20 @@ def _tilt(normals, v, out, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def link(corners, face, neighbours, place, faces, normals, across, bend, curvature, crease):  # type: ignore[no-untyped-def]
-    """Fill `across`, `bend`, `crease`, and the curvature across each edge: see `curve`.
+def link(corners, face, neighbours, place, faces, normals, across, bend, lean, excess, width):  # type: ignore[no-untyped-def]
+    """Fill `across`, `bend`, `lean`, and what creases and curvature follow from.
 
     Parameters
     ----------
     face : (m,) behind each triangle in the order of the leaves; place : (m,) of each face in that order.
     neighbours : (m, 3) of the faces, negative where there is none, or more than one.
     faces, normals : (m, 3) vertices of each face; (n, 3) upward normals of the vertices, of any length.
+    excess : (m, 3) θ² − 4 (a² + b²) of each edge. width : (m, 3) of the triangle across it [m], 0 where there is none.
     """
     for i in range(len(corners)):
         n = upward(corners, i)
         for e in range(3):
-            across[i, e], bend[i, e], curvature[i, e], crease[i, e] = -1, 0.0, 0.0, 0.0
+            across[i, e], bend[i, e], lean[i, e], excess[i, e], width[i, e] = -1, 0.0, 0.0, 0.0, 0.0
             other = neighbours[face[i], e]
             if other < 0:
                 continue
@@ -125,53 +132,86 @@ def link(corners, face, neighbours, place, faces, normals, across, bend, curvatu
             whole = sqrt(rise * rise + run * run)
             bend[i, e] = rise / (whole + run) if whole + run > 1e-6 * whole else 1e6
             turn = bend_angle(bend[i, e])
+            ends = _tilt(normals, faces[face[i], e], out, n) + _tilt(normals, faces[face[i], (e + 1) % 3], out, n)
+            lean[i, e] = min(max(-0.5 * ends / turn, 0.0), 1.0) if turn != 0.0 else 0.0
             before = _tilt(normals, faces[face[i], (e + 2) % 3], out, n)
             beyond = _tilt(normals, faces[other, apex], out, n)
-            square = turn * turn - 4.0 * (before * before + (turn + beyond) * (turn + beyond))
-            sharp = sqrt(max(square, 0.0))
-            if turn < 0.0:
-                x = min(max((sharp - SLIGHT) / (DISTINCT - SLIGHT), 0.0), 1.0)
-                sharp *= -x * x * (3.0 - 2.0 * x)
-            crease[i, e] = sharp
-            width = min(whole, -dot(minus(corner(corners, i, (e + 2) % 3), start), out))
-            curvature[i, e] = (turn - sharp) / width
+            excess[i, e] = turn * turn - 4.0 * (before * before + (turn + beyond) * (turn + beyond))
+            width[i, e] = min(whole, -dot(minus(corner(corners, i, (e + 2) % 3), start), out))
             if n[2] > LEVEL and (n[2] * run - out[2] * rise) > LEVEL * whole:
                 across[i, e] = j
 
 
 @kernel
-def curve(corners, across, edge_curvature, curvature):  # type: ignore[no-untyped-def]
-    """Fill `curvature` from that at the edges.
+def measure(corners, bend, width, sums):  # type: ignore[no-untyped-def]
+    """Fill (m, 4) sums of each triangle: its area, and over its edges length times 1, the bend and its size [rad].
+
+    A bend of `DISTINCT` or more is an edge of the ground, whatever is around: it counts as so much.
+    """
+    for i in range(len(corners)):
+        n, base = upward(corners, i), corner(corners, i, 0)
+        area = 0.5 * abs(dot(cross(minus(corner(corners, i, 1), base), minus(corner(corners, i, 2), base)), n))
+        sums[i, 0], sums[i, 1], sums[i, 2], sums[i, 3] = area, 0.0, 0.0, 0.0
+        for e in range(3):
+            if width[i, e] > 0.0 and n[2] > LEVEL:
+                along, turn = minus(corner(corners, i, (e + 1) % 3), corner(corners, i, e)), bend_angle(bend[i, e])
+                size = sqrt(dot(along, along))
+                sums[i, 1] += size
+                turn = min(max(turn, -DISTINCT), DISTINCT)
+                sums[i, 2], sums[i, 3] = sums[i, 2] + size * turn, sums[i, 3] + size * abs(turn)
+
+
+@kernel
+def curve(corners, bend, excess, width, noise, curvature, crease):  # type: ignore[no-untyped-def]
+    """Fill `crease`, and the `curvature` of each triangle by itself.
 
     The curvatures at a triangle's three edges, each across its edge, add up to that of the surface: exactly for a
-    quadratic one that is sampled on a grid. The mean with those of the triangles around is taken. A wall has none.
+    quadratic one that is sampled on a grid. A wall has none.
+
+    Parameters
+    ----------
+    noise : (m,) of the bends around [rad].
     """
     for i in range(len(corners)):
         n = upward(corners, i)
         xx = xy = yy = 0.0
         for e in range(3):
-            k = edge_curvature[i, e]
-            if k != 0.0 and n[2] > LEVEL:
+            crease[i, e] = 0.0
+            if width[i, e] == 0.0:
+                continue
+            turn = bend_angle(bend[i, e])
+            sharp = sqrt(max(excess[i, e] - noise[i] * noise[i], 0.0))
+            if turn < 0.0:
+                x = min(max((sharp - SLIGHT) / (DISTINCT - SLIGHT), 0.0), 1.0)
+                sharp *= -x * x * (3.0 - 2.0 * x)
+            crease[i, e] = sharp
+            if n[2] > LEVEL:
+                k = (turn - sharp) / width[i, e]
                 along = minus(corner(corners, i, (e + 1) % 3), corner(corners, i, e))
                 out, size = cross(along, n), dot(along, along)
                 x, y = out[0] - out[2] * n[0] / n[2], out[1] - out[2] * n[1] / n[2]
                 xx, xy, yy = xx + k * x * x / size, xy + k * x * y / size, yy + k * y * y / size
         curvature[i, 0], curvature[i, 1], curvature[i, 2] = xx, xy, yy
-    for i in range(len(corners)):
+
+
+@kernel
+def spread(across, own, around, coherent, noise, curvature):  # type: ignore[no-untyped-def]
+    """Fill `curvature` from that of the triangles by themselves, with their neighbours, and of all around; and noise.
+
+    Parameters
+    ----------
+    own, around : (m, 3) of each by itself; mean at the scale of the block.
+    coherent : (m,) how far the bends around are those of a surface, 0 to 1: the share of the first.
+    """
+    for i in range(len(across)):
         for k in range(3):
-            edge_curvature[i, k] = curvature[i, k]
-    for i in range(len(corners)):
-        weight = OWN
-        for k in range(3):
-            curvature[i, k] *= OWN
-        for e in range(3):
-            j = across[i, e]
-            if j >= 0:
-                weight += 1.0
-                for k in range(3):
-                    curvature[i, k] += edge_curvature[j, k]
-        for k in range(3):
-            curvature[i, k] /= weight
+            total, weight = OWN * own[i, k], OWN
+            for e in range(3):
+                j = across[i, e]
+                if j >= 0:
+                    total, weight = total + own[j, k], weight + 1.0
+            curvature[i, k] = around[i, k] + coherent[i] * (total / weight - around[i, k])
+        curvature[i, 3] = noise[i]
 
 
 @kernel

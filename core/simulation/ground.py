@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What blocks fall on: the terrain, structures that stand on it, and zones with parameters of their own."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -18,6 +18,7 @@ from ..terrain.joining import moved
 from ..terrain.raycast import cast_rays, closest_points, heights_above
 from ..terrain.surface import Surface, face_cross_products
 from ..vectors import Array, Mask
+from .block_scale import at_scale
 from .ground_faults import GroundFaults, ground_faults
 from .holes import rims_of_holes
 from .pairs import make_pairs
@@ -152,24 +153,47 @@ class Ground:
 
     @cached_property
     def facets(self) -> Any:
-        """What lies about each triangle, for blocks that roll: see `facet_kernels`; empty with points."""
+        """What lies about each triangle, for blocks that roll, whatever their size: `across`, `bend`, `clear` and
+        `lean` of `facet_kernels`; empty with points."""
+        across, bend, lean = self._linked()[:3]
+        return across, bend, np.zeros((len(across), 4), np.float32), lean
+
+    def _linked(self) -> tuple[Any, Any, Any, Any, Any]:
+        """See `facet_kernels.link`."""
         m = 0 if len(self.points) else len(self.faces)
-        across, clear = np.empty((m, 3), np.int32), np.zeros((m, 4), np.float32)
-        bend, curvature, crease = (np.empty((m, 3), np.float32) for _ in range(3))
+        across = np.empty((m, 3), np.int32)
+        bend, lean, excess, width = (np.empty((m, 3), np.float32) for _ in range(4))
         if m:
             from ..terrain.kernels import edge_neighbours
-            from .facet_kernels import curve, link
+            from .facet_kernels import link
 
             face = self.index.face
             place = np.empty(m, np.int32)
             place[face] = np.arange(m, dtype=np.int32)
             neighbours = edge_neighbours(self.faces, len(self.vertices))
-            link(
-                self.index.corners, face, neighbours, place, self.faces, self._vertex_normals,
-                across, bend, at_edges := np.empty((m, 3), np.float32), crease,
-            )  # fmt: skip
-            curve(self.index.corners, across, at_edges, curvature)
-        return across, bend, clear, curvature, crease
+            normals = self._vertex_normals
+            link(self.index.corners, face, neighbours, place, self.faces, normals, across, bend, lean, excess, width)
+        return across, bend, lean, excess, width
+
+    def facets_at(self, steps: Iterable[int]) -> Any:
+        """What kernels take of k sizes of blocks: curvature (k, m, 4) and crease (k, m, 3) between those of `facets`.
+
+        steps : k numbers, see `block_scale.step_of`.
+        """
+        wanted = tuple(steps)
+        found = self._at_steps.get(wanted)
+        if found is None:
+            across, bend, _, excess, width = self._linked()
+            corners = self.index.corners if len(across) else np.empty((0, 3, 3))
+            both = [at_scale(corners, (across, bend, excess, width), 2.0 ** (0.5 * one)) for one in wanted]
+            found = np.stack([one for one, _ in both]), np.stack([one for _, one in both])
+            self._at_steps.clear()  # one at a time: they are as large as the terrain
+            self._at_steps[wanted] = found
+        return *self.facets[:3], *found, self.facets[3]
+
+    @cached_property
+    def _at_steps(self) -> dict[tuple[int, ...], tuple[Any, Any]]:
+        return {}
 
     @property
     def _vertex_normals(self) -> Array:

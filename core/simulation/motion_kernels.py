@@ -28,7 +28,7 @@ from ..compiled import borrowing, kernel
 from ..terrain.kernels import STACK_SIZE
 from .chance_kernels import ATTITUDE, fill_uniform
 from .contact_kernels import TOUCHING_M, inlined, last_root
-from .corner_kernels import FREE, FUZZY, angle_between, met, share_of_crease, share_of_wall
+from .corner_kernels import FREE, FUZZY, angle_between, between, beyond_noise, met, share_of_crease, share_of_wall
 from .drag_kernels import DRAG_CHANGE, with_drag
 from .edge_kernels import keeps, onto, over, turns_about
 from .facet_kernels import NOWHERE
@@ -393,9 +393,11 @@ def run_block(  # type: ignore[no-untyped-def]
                     q = _touching(tree, stack, q, turned, radius, nearby, close, n)[0]
             elif edge != AT_ANOTHER:
                 t, q, turned, e, hit = over(
-                    tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, HOP * radius, dt
+                    tree, facets, stack, p, v, n, place, edge, radius, gravity, factor, mu, HOP * radius
                 )
                 moves, leaves, edge = hit >= 0, hit < 0 and t > 0.0, ON_TRIANGLE
+                if leaves:
+                    p, v = q, turned
         if not moves:
             dt = t if leaves else dt
             free, falling = _at(p, v, (0.0, 0.0, -gravity), dt)
@@ -464,19 +466,15 @@ def run_block(  # type: ignore[no-untyped-def]
             if meets:
                 share = 1.0
                 if len(tree) == 6:
-                    share = share_of_crease(facets, tree[3], place, other, v, n)
+                    share = share_of_crease(facets, tree[3], place, other, v, n, angle)
                 else:
-                    share = sqrt(max(1.0 - (FUZZY / angle) ** 2, 0.0))
+                    share = beyond_noise(angle, FUZZY)
                 after, wall = met(v, n, against, rolls, share * share), share_of_wall(angle)
                 if wall > 0.0 and towards * towards > 2.0 * gravity * HOP * radius:
                     fill_uniform(seed, run, impacts, draws)
                     v1, w1 = v, w
                     v, w = rebound(v1, against, w1, radius, mass, parameters[own + zone[other]], draws)
-                    v = (
-                        after[0] + wall * (v[0] - after[0]),
-                        after[1] + wall * (v[1] - after[1]),
-                        after[2] + wall * (v[2] - after[2]),
-                    )
+                    v, w = between(after, v, wall), between(_rolling(against, after, radius), w, wall)
                     impacts += 1
                     if record >= IMPACTS:
                         write(rows, count, run, IMPACT, time, p, v, w, v1, w1, against, other)
@@ -587,13 +585,14 @@ def run_block(  # type: ignore[no-untyped-def]
 
 @kernel
 def run_blocks(  # type: ignore[no-untyped-def]
-    tree, facets, zone, rebound, parameters, friction, own, draw_count, among, runs, seed, place, velocity, spin,
+    tree, facets, scale, zone, rebound, parameters, friction, own, draw_count, among, runs, seed, place, velocity, spin,
     radius, mass, inertia, moments, drag, gravity, law, most_impacts, most_s, record, stems, results, rows,
 ):  # fmt: skip
     """Simulate n blocks, `own` (n,) their sets; returns their records, in `rows` or in a longer array, and how many.
 
     Parameters
     ----------
+    facets : see `facet_kernels`, with curvature and crease of k scales; scale : (n,) which of them is each block's.
     among : (n,) the place of each, which its records have; runs : (n,) its number.
     results : (n, 7) to be filled: end, time, impacts, length, v_max, hits of trees, records.
     """
@@ -604,9 +603,10 @@ def run_blocks(  # type: ignore[no-untyped-def]
     uniform = np.empty(3)
     for i in range(len(runs)):
         first, end = count, NO_ROOM
+        about = facets[0], facets[1], facets[2], facets[3][scale[i]], facets[4][scale[i]], facets[5]
         while end == NO_ROOM:  # with longer records it begins again: to make them there costs all of it each turn
             count, end, time, impacts, length, v_max, trees = run_block(
-                tree, facets, zone, rebound, parameters, friction, own[i], draws, stack, times, nearby, close, rows,
+                tree, about, zone, rebound, parameters, friction, own[i], draws, stack, times, nearby, close, rows,
                 first, runs[i], seed, (place[i, 0], place[i, 1], place[i, 2]),
                 (velocity[i, 0], velocity[i, 1], velocity[i, 2]),
                 (spin[i, 0], spin[i, 1], spin[i, 2]), radius[i], mass[i], inertia[i],

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which part of the terrain is in which zone."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,26 @@ from .polygons import Polygon
 
 WHOLE = "terrain"
 """The zone that no other covers: the parameters of the whole."""
+
+
+@dataclass(frozen=True, eq=False)
+class Zones:
+    """Parts of the terrain with parameters of their own.
+
+    Attributes
+    ----------
+    names : the first is what no other zone covers.
+    of_face : (m,) place in `names` of each of the terrain's faces, of a cloud's points.
+    parameters : zone → model → parameters that differ there.
+    friction : zone → μ that differs there.
+    remarks : what a user should know of how they cover the terrain.
+    """
+
+    names: tuple[str, ...]
+    of_face: NDArray[np.int32]
+    parameters: Mapping[str, Mapping[str, Mapping[str, object]]] = field(default_factory=dict)
+    friction: Mapping[str, float] = field(default_factory=dict)
+    remarks: tuple[Remark, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..analysis.back_analysis import BackAnalysis
 from ..analysis.completeness import (
     NOT_STATED,
     PART,
     RUN_OUT,
     Completeness,
     IfLongest,
-    ShortRuns,
     check_stops,
     completeness_remarks,
     find_short_runs,
@@ -26,13 +26,11 @@ from ..analysis.completeness import (
     posterior_if_longest,
     run_outs,
 )
-from ..analysis.held_out import Prediction, fifths, hold_out
+from ..analysis.held_out import fifths, hold_out
 from ..analysis.likelihood_free import Posterior, SimulatedSets, check_size, places_of_truth, sample_posterior
 from ..analysis.observed_runs import Observed
 from ..analysis.paths import Paths, simulated_paths
 from ..analysis.posterior_checks import (
-    PosteriorEstimate,
-    PredictiveCheck,
     correlations,
     doubts_of,
     estimates_of,
@@ -56,7 +54,7 @@ from ..analysis.sections import Axis, Section, axis_of, crossings, default_secti
 from ..errors import InputError
 from ..impact_models.registry import find_model
 from ..progress import CancelledError, Progress, silent
-from ..remarks import Remark, gravest_first
+from ..remarks import gravest_first
 from ..simulation.engine import Recorded, Settings, check_settings, simulate
 from ..simulation.ground import Ground
 from ..simulation.parameter_draws import FRICTION_NAME, ParameterDraws
@@ -72,48 +70,6 @@ TRUTHS = 200
 RUNS_AT_ONCE = 16_384
 FAR_M = 1e9
 """No run is longer."""
-
-
-@dataclass(frozen=True, eq=False)
-class BackAnalysis:
-    """What observed runs say of the parameters of a model.
-
-    Attributes
-    ----------
-    model : its name. settings : those that were not fitted.
-    priors : k parameters.
-    observed : what was read off the runs.
-    draws : the posterior, for `Settings`.
-    correlation : (k, k) of the draws.
-    estimates : one for each parameter. checks : one for each quantity.
-    prediction : of runs that were held out.
-    predicted : (S, n, Q) values of data sets simulated with draws of the posterior.
-    effective : draws of equal weight that say as much.
-    runs : how many were simulated. seconds : how long it took.
-    completeness : what is stated of the observed runs. falls : how many blocks fell with each set of parameters.
-    short_runs : whether the observed runs look as if short ones were missing; None where that cannot be told.
-    if_longest : the parameters if they were the longest part of the falls; None where all is stated or nothing known.
-    remarks : what it is worth, the gravest first.
-    """
-
-    model: str
-    settings: Settings
-    priors: tuple[Prior, ...]
-    observed: ObservedValues
-    draws: ParameterDraws
-    correlation: Array
-    estimates: tuple[PosteriorEstimate, ...]
-    checks: tuple[PredictiveCheck, ...]
-    prediction: Prediction
-    predicted: Array
-    effective: float
-    runs: int
-    seconds: float
-    completeness: Completeness
-    falls: int
-    short_runs: ShortRuns | None
-    if_longest: IfLongest | None
-    remarks: tuple[Remark, ...]
 
 
 def back_analyse(

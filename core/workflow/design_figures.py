@@ -8,6 +8,7 @@ import numpy as np
 
 from ..analysis.figures import MEASURED, MUTED, PAGE_IN, STYLE
 from ..analysis.whole_run_figures import model_colour
+from ..exchange.map_figures import DARKEST, Window, hillshade, map_figure, north_arrow, reached, scale_bar
 from ..extras import FIGURES, demand
 from ..hazard.maps import LAYERS
 from ..hazard.screens import Screen, blocks_at, points_along
@@ -17,7 +18,6 @@ from ..simulation.parabolas import parabolas_of, polylines_of
 from ..simulation.results import fell_through
 from ..vectors import Array
 from .design_sheet import ENERGY_LINES_DEG, DesignSheet, ModelDesign
-from .map_figures import DARKEST, Window, hillshade, map_figure, north_arrow, reached, scale_bar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A design sheet: what barriers must have, from many simulated blocks, with the evidence that these are like the real.
 
-The numbers behind the page that an engineer hands over; `exchange.design_page` writes it.
+The numbers behind the page that an engineer hands over; `design_page` writes it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

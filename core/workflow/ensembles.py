@@ -76,7 +76,7 @@ class Chunk:
 
 
 class Store(Protocol):
-    """Keeps what is finished; see `exchange.chunk_store`."""
+    """Keeps what is finished; see `chunk_store`."""
 
     def merged(self) -> tuple[Mapping[str, Arrays], frozenset[int]]:
         """What is added up already, of which chunks."""

@@ -17,11 +17,11 @@ from ..reconstruction.ray_flight import flight_through_rays
 from ..reconstruction.refinement.ground_errors import normal_variance
 from ..reconstruction.refinement.setup import default_accuracy
 from ..reconstruction.refinement.views import View
+from ..reconstruction.sightings import NO_EVENTS, Events, SeenVideo, Sightings, joined, some
 from ..reconstruction.triangulation import SpacePoints, TerrainPicks, contact_points, pick_on_terrain, triangulate
 from ..terrain.raycast import cast_rays, closest_point
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices, Mask, Names, norm
-from .sightings import NO_EVENTS, Events, SeenVideo, Sightings, joined, some
 
 FAR_M = 100.0
 """Distance at which pixels are taken to be that meet no terrain; only for a swaying camera does it matter."""

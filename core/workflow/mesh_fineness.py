@@ -80,8 +80,8 @@ def fineness_remarks(simulations: Sequence[Simulation]) -> list[Remark]:
     if not found.is_coarse:
         return [Remark(text, "note", "mesh")]
     text += (
-        " Where the ground is curved, single triangles may change the run-out. Check the mesh to see by how much, or use "
-        "a mesh with edges of half a diameter."
+        " Where the ground is curved, single triangles may change the run-out. Check the mesh to see by how much, or "
+        "use a mesh with edges of half a diameter."
     )
     return [Remark(text, "warning", "mesh")]
 

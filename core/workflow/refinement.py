@@ -9,16 +9,16 @@ import numpy as np
 from ..errors import InputError
 from ..progress import Progress, silent
 from ..reconstruction.block import Block
-from ..reconstruction.choices import SIGMA_AIM, Loss
+from ..reconstruction.choices import SIGMA_AIM, SIGMA_DATUM, Loss
 from ..reconstruction.drag import Drag
 from ..reconstruction.picks import Picks, take
 from ..reconstruction.refinement.refine import refine
 from ..reconstruction.refinement.result import Refinement
 from ..reconstruction.refinement.views import PixelObservations
+from ..reconstruction.sightings import SeenVideo, Sightings, joined, some
 from ..remarks import Remark, gravest_first
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices, norm
-from .sightings import SeenVideo, Sightings, joined, some
 
 NAMED = 8
 """Trajectories that a message lists, at most."""
@@ -77,6 +77,7 @@ def refine_picks(
     free: Sequence[str] = (),
     sigma_terrain_m: float | None = None,
     sigma_aim: float = SIGMA_AIM,
+    sigma_datum: float = SIGMA_DATUM,
     loss: Loss = "huber",
     site: str = "",
     progress: Progress = silent,
@@ -115,6 +116,7 @@ def refine_picks(
         free=[name for name in free if clocked or not name.startswith("clock")],
         sigma_terrain_m=sigma_terrain_m,
         sigma_aim=sigma_aim,
+        sigma_datum=sigma_datum,
         loss=loss,
         site=site,
         progress=progress,

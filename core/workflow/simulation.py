@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..analysis.likelihood_free import weighted_quantiles
 from ..analysis.measured_rebounds import beyond_measured, beyond_sentence, measured_sentence
@@ -38,6 +37,7 @@ from ..simulation.parameter_draws import ParameterDraws
 from ..simulation.release import Releases
 from ..simulation.results import fell_through
 from ..simulation.trees import LAW, NOT_KNOWN, Trees
+from ..simulation.zones import Zones
 from ..terrain.cloud import Cloud
 from ..terrain.surface import Surface
 from .mesh_fineness import fineness_remarks
@@ -59,26 +59,6 @@ LONG_S = 1.0
 """Less need not be said."""
 MUCH_BEYOND = 0.25
 """From this share on a result of the model observed is mostly one of conditions that nobody has measured."""
-
-
-@dataclass(frozen=True, eq=False)
-class Zones:
-    """Parts of the terrain with parameters of their own.
-
-    Attributes
-    ----------
-    names : the first is what no other zone covers.
-    of_face : (m,) place in `names` of each of the terrain's faces, of a cloud's points.
-    parameters : zone → model → parameters that differ there.
-    friction : zone → μ that differs there.
-    remarks : what a user should know of how they cover the terrain.
-    """
-
-    names: tuple[str, ...]
-    of_face: NDArray[np.int32]
-    parameters: Mapping[str, Mapping[str, Mapping[str, object]]] = field(default_factory=dict)
-    friction: Mapping[str, float] = field(default_factory=dict)
-    remarks: tuple[Remark, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ compared.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from ..analysis.ranks import FEWEST
 from ..analysis.sections import Section, default_sections
 from ..analysis.whole_runs import WholeRuns, compare_runs
 from ..errors import InputError
+from ..exchange.whole_run_tables import read_stops
 from ..impact_models.registry import find_model
 from ..progress import CancelledError, Progress, silent
 from ..reconstruction.trajectory import Reconstruction
@@ -32,7 +34,7 @@ from ..simulation.measured_releases import from_reconstruction
 from ..simulation.release import Releases, join_releases, standing_on
 from ..terrain.raycast import closest_points
 from ..vectors import Array, Indices, Mask
-from .simulation import remarks_of, run_models
+from .simulation import ReleaseSource, remarks_of, run_models
 
 
 class ObservedRuns(NamedTuple):
@@ -40,6 +42,12 @@ class ObservedRuns(NamedTuple):
 
     observed: Observed
     releases: Releases
+
+
+def stopped_runs(ground: Ground, source: ReleaseSource, stops: str | Path) -> ObservedRuns:
+    """Blocks of which it is known where they started and stopped; see `read_stops`."""
+    releases = source(ground)
+    return ObservedRuns(read_stops(stops, releases, ground), releases)
 
 
 def join_runs(parts: Sequence[ObservedRuns]) -> ObservedRuns:

@@ -9,17 +9,15 @@ from pathlib import Path
 
 import bpy
 
+from ...core.analysis.back_analysis import BackAnalysis
 from ...core.analysis.calibration import usual_names
 from ...core.analysis.completeness import Completeness, parse_completeness
 from ...core.analysis.priors import Prior, laws_in, make_priors
 from ...core.analysis.sections import Section
 from ...core.errors import RockfallError
 from ...core.exchange.job_inputs import input_hashes
-from ...core.exchange.opening import reconstruct_project
 from ...core.exchange.simulation_entry import TABLE, ReleaseEntry, SimulationEntry
-from ...core.exchange.simulation_project import placed_source
 from ...core.exchange.tables import read_picks
-from ...core.exchange.whole_run_tables import stopped_runs
 from ...core.impact_models.registry import MODELS, find_model
 from ...core.progress import Progress
 from ...core.reconstruction.trajectory import Reconstruction
@@ -27,9 +25,11 @@ from ...core.remarks import Remark, to_plain
 from ...core.simulation.ground import Ground
 from ...core.simulation.parameter_draws import FRICTION_NAME
 from ...core.terrain.surface import Surface
-from ...core.workflow.back_analysis import BackAnalysis, back_analyse
+from ...core.workflow.back_analysis import back_analyse
+from ...core.workflow.opening import reconstruct_project
+from ...core.workflow.scenarios import placed_source
 from ...core.workflow.simulation import ReleaseSource, Scenario, ground_of
-from ...core.workflow.whole_runs import ObservedRuns, join_runs, measured_runs, stated_sections
+from ...core.workflow.whole_runs import ObservedRuns, join_runs, measured_runs, stated_sections, stopped_runs
 from . import (
     fingerprints,
     model_parameters,

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import bpy
 
-from ...core.exchange.design_page import write_design
 from ...core.exchange.partial_factors import USUAL, open_factors, shipped_names
 from ...core.exchange.screens import write_screens
 from ...core.extras import FIGURES, is_there
 from ...core.output import output_folder
 from ...core.progress import Progress
 from ...core.reconstruction.trajectory import Reconstruction
+from ...core.workflow.design_page import write_design
 from ...core.workflow.design_sheet import design_sheet
 from ...core.workflow.enough import as_many_as
 from ...core.workflow.simulation import ground_of

@@ -16,8 +16,8 @@ import numpy as np
 
 from ...core.analysis.motion_graphs import QUANTITIES, MotionCourse, delayed, motion_courses
 from ...core.errors import RockfallError
+from ...core.reconstruction.sightings import SeenVideo
 from ...core.workflow.refinement import pixels_of
-from ...core.workflow.sightings import SeenVideo
 from . import fingerprints, own_impacts, picks, reconstruction, sightings, store, sync, timing, videos
 
 

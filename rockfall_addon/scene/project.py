@@ -10,7 +10,6 @@ import bpy
 
 from ...core.analysis.completeness import NOT_STATED
 from ...core.errors import RockfallError
-from ...core.exchange.opening import open_project, open_terrain
 from ...core.exchange.parameters import checked_parameters
 from ...core.exchange.project import (
     CameraPlacement,
@@ -29,12 +28,13 @@ from ...core.impact_models.registry import COMPARED
 from ...core.output import output_folder
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark
+from ...core.simulation.zones import Zones
 from ...core.terrain.cloud import Cloud
 from ...core.terrain.readers import read_structure
 from ...core.terrain.shading import shade
 from ...core.terrain.surface import Surface
 from ...core.terrain.writers import write_ply
-from ...core.workflow.simulation import Zones
+from ...core.workflow.opening import open_project, open_terrain
 from . import (
     back_analysis,
     film_preset,

@@ -11,17 +11,17 @@ import numpy as np
 
 from ...core.camera.model import SIGMA_PX
 from ...core.exchange.cameras import CameraFile, write_camera
-from ...core.exchange.footage import open_entry
 from ...core.exchange.footage_tables import Track, read_track, write_track
-from ...core.exchange.opening import read_project_camera
 from ...core.exchange.project import Project, VideoEntry
 from ...core.exchange.spin_tables import read_spin_marks, write_spin_marks
 from ...core.footage.clock import Clock, clock_for
 from ...core.footage.sequences import is_there
 from ...core.footage.video import Video
 from ...core.georeference import GlobalShift
+from ...core.reconstruction.spin_marks import SpinMarks
 from ...core.terrain.surface import Surface
-from ...core.workflow.spin_marks import SpinMarks
+from ...core.workflow.footage import open_entry
+from ...core.workflow.opening import read_project_camera
 from . import (
     camera_paths,
     clocks,

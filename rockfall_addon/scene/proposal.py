@@ -15,6 +15,7 @@ import numpy as np
 from ...core.errors import RockfallError
 from ...core.footage.clock import Clock
 from ...core.reconstruction.flight import flight_states
+from ...core.reconstruction.refinement.reliability import worst
 from ...core.reconstruction.refinement.result import Refinement
 from ...core.reconstruction.refinement.what_if import gravest
 from ...core.remarks import Remark
@@ -47,6 +48,8 @@ class Proposal:
     by_video : the latter for each video.
     unknowns : name, value and standard deviation of what was fitted beside the picks.
     what_if : a change of an input, and by how much a speed and R change at most, as text.
+    unnoticed : an error of what is stated, how large it may be without being noticed, and what it then does to a speed
+        at most, as text.
     stale : the picks were changed since.
     """
 
@@ -58,6 +61,7 @@ class Proposal:
     changes: tuple[Change, ...]
     unknowns: tuple[tuple[str, float, float], ...]
     what_if: tuple[tuple[str, str, str], ...]
+    unnoticed: tuple[tuple[str, str, str], ...]
     remarks: tuple[Remark, ...]
     stale: bool
 
@@ -111,6 +115,7 @@ def keep(scene: bpy.types.Scene, refined: Refined, cameras: Sequence[bpy.types.O
         "picks": [list(row) for row in zip(labels, *(column.tolist() for column in changes), strict=True)],
         "unknowns": [[name, *pair] for name, pair in fit.unknowns.items()],
         "what_if": [[row.cells[0], row.cells[2], row.cells[4]] for row in gravest(fit.what_if)],
+        "unnoticed": [[row.cells[0], row.cells[1], row.cells[3]] for row in worst(fit.statements)],
         "advice": [[remark.text, remark.severity, remark.about] for remark in refined.remarks],
         "clocks": {identifier: view.clock.numbers for identifier, view in zip(ids, fit.views, strict=True)},
         "gaps": any(view.clock.gaps for view in fit.views),
@@ -151,6 +156,7 @@ def read(scene: bpy.types.Scene) -> Proposal | None:
         changes=tuple(Change(*row) for row in kept["picks"]),
         unknowns=tuple((name, value, sigma) for name, value, sigma in kept["unknowns"]),
         what_if=tuple((change, speed, r) for change, speed, r in kept.get("what_if", [])),  # 0.1.0 has none
+        unnoticed=tuple((error, size, speed) for error, size, speed in kept.get("unnoticed", [])),  # nor these
         # 0.1.0 kept sentences alone
         remarks=tuple(Remark(one) if isinstance(one, str) else Remark(*one) for one in kept["advice"]),
         stale=_is_stale(scene, kept),

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...core.constants import AIR_DENSITY_KGPM3, DRAG_COEFFICIENT, GRAVITY_MPS2
 from ...core.errors import InputError, RockfallError
-from ...core.exchange.opening import block_of
 from ...core.exchange.project import BlockEntry, Project, ReconstructionSettings
 from ...core.reconstruction.block import Block
 from ...core.reconstruction.drag import Drag
@@ -17,6 +16,7 @@ from ...core.reconstruction.picks import Picks
 from ...core.reconstruction.trajectory import Reconstruction, reconstruct
 from ...core.remarks import Remark
 from ...core.terrain.surface import Surface
+from ...core.workflow.opening import block_of
 from . import (
     fingerprints,
     migration,

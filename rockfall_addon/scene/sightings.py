@@ -9,8 +9,8 @@ import numpy as np
 
 from ...core.footage.tracking import BlockTrack
 from ...core.reconstruction.refinement.views import View
+from ...core.reconstruction.sightings import SeenVideo, Sightings, joined
 from ...core.vectors import Array, Indices
-from ...core.workflow.sightings import SeenVideo, Sightings, joined
 from . import camera_paths, clocks, named_rows, pictures, store, videos
 
 COLUMNS = 6  # frame, video time, u, v, sigma, clicked by hand

@@ -11,7 +11,6 @@ import numpy as np
 
 from ...core.errors import RockfallError
 from ...core.exchange.simulation_entry import MEASURED, STEEP, ReleaseEntry, SimulationEntry
-from ...core.exchange.simulation_project import measured_source, placed_source
 from ...core.reconstruction.picks import take
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.remarks import Remark
@@ -20,6 +19,7 @@ from ...core.simulation.engine import Rolling
 from ...core.simulation.ground import Contact
 from ...core.simulation.measured_releases import start_times
 from ...core.terrain.surface import Surface
+from ...core.workflow.scenarios import measured_source, placed_source
 from ...core.workflow.simulation import ReleaseSource
 from . import drawn_releases, fingerprints, georeference, models, posterior, reconstruction, simulated_trees, store
 from .simulation import Origin

@@ -14,10 +14,9 @@ import numpy as np
 from ...core.errors import RockfallError
 from ...core.exchange.zones import zones_with
 from ...core.simulation.ground import element_places
-from ...core.simulation.zones import face_values, nearest_values, zones_of_parts
+from ...core.simulation.zones import Zones, face_values, nearest_values, zones_of_parts
 from ...core.terrain.cloud import Cloud
 from ...core.terrain.surface import Surface
-from ...core.workflow.simulation import Zones
 from . import terrain, terrain_mesh
 
 HALF = 0.5

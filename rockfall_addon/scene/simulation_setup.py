@@ -13,15 +13,11 @@ import numpy as np
 from ...core.analysis.measured_rebounds import measured_rebounds
 from ...core.errors import RockfallError
 from ...core.exchange.simulation_entry import SimulationEntry
-from ...core.exchange.simulation_output import default_records, write_simulations
-from ...core.exchange.simulation_project import times_as_many
-from ...core.exchange.trees import open_trees
 from ...core.hazard.barriers import with_barriers
 from ...core.hazard.screens import Screen, check_screens
 from ...core.impact_models.registry import MODELS, find_model
 from ...core.output import output_folder
 from ...core.progress import Progress
-from ...core.reconstruction.drag import Drag
 from ...core.remarks import Remark, from_plain, gravest_first, to_plain
 from ...core.simulation.engine import Simulation
 from ...core.simulation.ground import Ground
@@ -30,8 +26,10 @@ from ...core.terrain.cloud import Cloud
 from ...core.terrain.surface import Surface
 from ...core.workflow.maps import SCREENS, Mapped
 from ...core.workflow.mesh_check import change_remarks, mesh_changes
+from ...core.workflow.scenarios import make_scenario, times_as_many
 from ...core.workflow.screens import outside_remarks, screen_remarks, tallies_of
 from ...core.workflow.simulation import ReleaseSource, Scenario, ground_of, remarks_of, run_models
+from ...core.workflow.simulation_output import default_records, write_simulations
 from . import (
     fingerprints,
     models,
@@ -119,23 +117,17 @@ def scenario_of(scene: bpy.types.Scene, entry: SimulationEntry, surface: Surface
     RockfallError : something cannot be.
     """
     met = surface if entry.contact == "mesh" else Cloud(surface.vertices, surface.shift, surface.name)
-    how, parameters = reconstruction.project_settings(scene, []).reconstruction, models.parameters_of(scene)
-    trees = None if entry.trees is None else open_trees(entry.trees, surface, entry.seed)[0]
     drawn = posterior.in_use(scene, entry.models)
-    return Scenario(
+    return make_scenario(
+        entry,
+        reconstruction.project_settings(scene, []).reconstruction,
         met,
         source,
-        {name: parameters.get(name, {}) for name in entry.models},
-        draws={} if drawn is None else {drawn.model: drawn.draws},
+        models.parameters_of(scene),
         structures=structures.met_of(scene),
-        rolling=entry.rolling,
-        friction=entry.friction,
-        drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,
         zones=simulated_zones.zones_of(scene, met, list(entry.models)),
-        gravity_mps2=how.gravity_mps2,
-        seed=entry.seed,
-        trees=trees,
-    )
+        draws={} if drawn is None else {drawn.model: drawn.draws},
+    )[0]
 
 
 @dataclass(frozen=True, eq=False)

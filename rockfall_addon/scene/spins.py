@@ -16,12 +16,13 @@ import numpy as np
 
 from ...core.errors import RockfallError
 from ...core.footage.advice import uncountable as uncountable_at
+from ...core.reconstruction.flight_spins import FlightSpin
 from ...core.reconstruction.refinement.views import View
+from ...core.reconstruction.sightings import joined
+from ...core.reconstruction.spin_marks import AXES, Axis, MarkedVideo, SpinMarks
 from ...core.reconstruction.trajectory import Reconstruction
 from ...core.vectors import Array
-from ...core.workflow.sightings import joined
-from ...core.workflow.spin_marks import AXES, Axis, MarkedVideo, SpinMarks
-from ...core.workflow.spins import FlightSpin, MeasuredSpins, measure_spins
+from ...core.workflow.spins import MeasuredSpins, measure_spins
 from . import camera_paths, clocks, named_rows, picks, pictures, places, reconstruction, store, videos
 
 COLUMNS = 7  # frame, video time, u, v, sigma, number of the axis, turns per second that were counted

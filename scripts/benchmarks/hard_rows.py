@@ -315,7 +315,7 @@ def scenes(falls: int, seed: int) -> list[tuple[Scene, Fall]]:
         slope = make_slope(rng)
         fine, given = slope.mesh(TRUE_STEP_M, 0.0, rng), slope.mesh(GIVEN_STEP_M, 0.005, rng)
         half = SIGMA_TERRAIN * np.sqrt(0.5)  # of the variance is in the height of all of it, and half in waves
-        raised = Surface(given.vertices + [0, 0, half * rng.normal()], given.faces, given.shift, given.name)
+        raised = Surface(given.vertices + np.array([0, 0, half * rng.normal()]), given.faces, given.shift, given.name)
         scene = Scene(slope, fine, wavy(raised, half, GIVEN_WAVES_M, rng))
         found += [(scene, fall(fine, rng)) for _ in range(min(FALLS_A_SLOPE, falls - len(found)))]
     return found

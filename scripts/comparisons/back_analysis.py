@@ -12,16 +12,17 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from rockfall.core.analysis.back_analysis import BackAnalysis
 from rockfall.core.analysis.observed_runs import Observed
 from rockfall.core.analysis.paths import simulated_paths
 from rockfall.core.analysis.priors import make_priors
-from rockfall.core.exchange.opening import open_terrain, reconstruct_project
 from rockfall.core.exchange.project import read_project
 from rockfall.core.impact_models.registry import find_model
 from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.measured_releases import from_reconstruction
-from rockfall.core.workflow.back_analysis import BackAnalysis, back_analyse
+from rockfall.core.workflow.back_analysis import back_analyse
+from rockfall.core.workflow.opening import open_terrain, reconstruct_project
 
 PROJECT = Path(__file__).parents[2] / "assets" / "demo" / "project.toml"
 MODEL, PARAMETERS = "stevens_1998", ("rn", "rt", "friction")

@@ -25,6 +25,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from rockfall.core.analysis.back_analysis import BackAnalysis
 from rockfall.core.analysis.completeness import NOT_STATED, Completeness
 from rockfall.core.analysis.held_out import PredictedQuantity, halves
 from rockfall.core.analysis.observed_runs import Observed, observe_stops
@@ -35,7 +36,7 @@ from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import Releases, make_releases, placed_on
 from rockfall.core.terrain.readers import read_terrain
 from rockfall.core.vectors import Array, Indices
-from rockfall.core.workflow.back_analysis import BackAnalysis, back_analyse
+from rockfall.core.workflow.back_analysis import back_analyse
 from rockfall.core.workflow.whole_runs import ComparedSimulations, compare_whole_runs
 
 DATA = Path(__file__).parents[2] / "tests" / "data"

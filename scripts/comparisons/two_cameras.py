@@ -10,8 +10,6 @@ from pathlib import Path
 
 import numpy as np
 from rockfall.core.camera.model import project
-from rockfall.core.exchange.footage import Footage, open_footage
-from rockfall.core.exchange.opening import blocks_of, drag_of, open_terrain
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.tables import read_picks
 from rockfall.core.reconstruction.block import Block
@@ -23,6 +21,8 @@ from rockfall.core.reconstruction.sampling import sample_trajectories
 from rockfall.core.reconstruction.triangulation import triangulate
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.vectors import Array
+from rockfall.core.workflow.footage import Footage, open_footage
+from rockfall.core.workflow.opening import blocks_of, drag_of, open_terrain
 from rockfall.core.workflow.refinement import pixels_of
 
 EXAMPLE = Path(__file__).parents[2] / "assets" / "examples" / "two_cameras"

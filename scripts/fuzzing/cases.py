@@ -168,8 +168,8 @@ def _videos() -> dict[str, Case]:
 
 
 def _projects(terrain: bytes) -> dict[str, Case]:
-    from rockfall.core.exchange.opening import open_terrain, read_project_picks
     from rockfall.core.exchange.project import read_project
+    from rockfall.core.workflow.opening import open_terrain, read_project_picks
 
     def opened(at: Path) -> object:
         project = read_project(at / "project.toml")

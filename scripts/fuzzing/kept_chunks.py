@@ -24,11 +24,11 @@ def _ground(terrain: bytes) -> object:
 def _run(terrain: bytes, kept: Path, out: Path) -> dict[str, bytes]:
     """The tables of a simulation that goes on from what is kept."""
     import numpy as np
-    from rockfall.core.exchange.simulation_chunks import simulate_in_chunks, write_chunk_tables
     from rockfall.core.simulation.blocks import Blocks
     from rockfall.core.simulation.engine import Settings
     from rockfall.core.simulation.release_sources import on_line
     from rockfall.core.workflow.ensembles import HereAlone
+    from rockfall.core.workflow.simulation_chunks import simulate_in_chunks, write_chunk_tables
 
     ground = _ground(terrain)
     line = np.array([[2.0, 4.0, np.nan], [2.0, 18.0, np.nan]])

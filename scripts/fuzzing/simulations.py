@@ -164,7 +164,6 @@ def readers() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
         whole_run_tables,
         zones,
     )
-    from rockfall.core.exchange.chunk_store import ChunkStore
     from rockfall.core.exchange.map_shapes import read_lines, read_polygons
     from rockfall.core.exchange.screens import read_screens
     from rockfall.core.exchange.simulation_tables import read_releases
@@ -172,6 +171,7 @@ def readers() -> dict[str, tuple[tuple[str, ...], Callable[[Path], object]]]:
     from rockfall.core.simulation.ground import Ground, make_ground
     from rockfall.core.terrain.opening import HowToRead
     from rockfall.core.terrain.readers import read_terrain
+    from rockfall.core.workflow.chunk_store import ChunkStore
 
     def ground(at: Path) -> Ground:
         return make_ground(read_terrain(at / "terrain.ply"))

@@ -206,6 +206,7 @@ def scan(part) -> bpy.types.Scene:
     line = np.linspace(0.0, 118.0, 60)
     x, y = (values.ravel() for values in np.meshgrid(line, line, indexing="ij"))
     z = 100 - 1.4 * np.minimum(x, 60) + 0.02 * np.maximum(x - 60, 0) + 0.4 * np.sin(x / 3) * np.cos(y / 4)
+    z = np.round(1024 * z) / 1024  # which single precision holds
     corner = (np.arange(59)[:, None] * 60 + np.arange(59)).ravel()
     ring = np.column_stack([corner, corner + 60, corner + 61, corner + 1])
     faces = np.vstack([ring[:, [0, 1, 2]], ring[:, [0, 2, 3]]]).astype(np.int32)

@@ -125,7 +125,7 @@ def test_it_goes_with_the_project_and_comes_back(part, scene, tmp_path: Path) ->
     rows = np.array([line.split(",")[1:] for line in text.splitlines()[1:]], dtype=float)
     np.testing.assert_array_equal(rows[:, 1:], kept["values"])
     project = part("core.exchange.project").read_project(tmp_path / "project.toml")
-    scenario, inputs = part("core.exchange.simulation_project").open_simulation(project, tmp_path / "project.toml")
+    scenario, inputs = part("core.workflow.scenarios").open_simulation(project, tmp_path / "project.toml")
     np.testing.assert_array_equal(scenario.draws[MODEL].values, kept["values"])
     assert inputs["posterior"] == tmp_path / "posterior.csv"
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)

@@ -27,7 +27,7 @@ ENDINGS = ["abc"] * HAS_ALEMBIC + ["glb"] + ["usdc"] * HAS_USD
 
 def truth(part, names: list[str], rate: float, frames: int) -> dict[str, np.ndarray]:
     """(f, 3) survey coordinates of each block, from its flights; NaN where no flight is known."""
-    opening, project = part("core.exchange.opening"), part("core.exchange.project")
+    opening, project = part("core.workflow.opening"), part("core.exchange.project")
     demo = Path(part("core").__file__).parents[1] / "assets" / "demo" / "project.toml"
     _, result = opening.open_project(project.read_project(demo))
     return flown(part, result, names, rate, frames)

@@ -16,7 +16,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 def demo(rockfall, part):
     """The demo's impacts; the scene has none."""
     project = part("core.exchange.project").read_project(part("rockfall_addon.steps.start.operators").DEMO)
-    return part("core.exchange.opening").open_project(project)[1].impacts
+    return part("core.workflow.opening").open_project(project)[1].impacts
 
 
 @pytest.fixture

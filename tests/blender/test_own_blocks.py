@@ -78,7 +78,7 @@ def test_tables_projects_and_files_have_it(slope, part, tmp_path: Path, mass_of)
     bpy.ops.rockfall.export_project(directory=str(tmp_path / "project"))
     project = part("core.exchange.project").read_project(tmp_path / "project" / "project.toml")
     assert [(one.name, one.d1_m, one.d2_m, one.shape) for one in project.blocks] == [("B", 0.7, 0.35, "box")]
-    found = part("core.exchange.opening").open_project(project)[1]
+    found = part("core.workflow.opening").open_project(project)[1]
     assert found.block["B"].mass_kg == pytest.approx(mass)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True, load_ui=False)

@@ -337,8 +337,8 @@ def test_proposals_are_the_first_picks_of_the_same_project(site, part, tmp_path)
         block=exchange.BlockEntry(**size),
         videos=part("rockfall_addon.scene.project_videos").write_videos(site, tmp_path),
     )
-    surface = part("core.exchange.opening").open_terrain(project)
-    first = part("core.exchange.footage").picks_from_footage(project, surface)
+    surface = part("core.workflow.opening").open_terrain(project)
+    first = part("core.workflow.footage").picks_from_footage(project, surface)
     assert made.kind.tolist() == first.kind.tolist()
     assert made.kind.tolist().count("pass") >= 1, "open flights are closed"
     np.testing.assert_allclose(made.time_s, first.time_s, atol=1e-6)

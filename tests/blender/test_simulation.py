@@ -437,3 +437,23 @@ def test_the_mesh_is_checked_where_that_is_asked_for(drawn: bpy.types.Scene, par
     assert set(of_mesh()) == {one.text for one in check.change_remarks(changes)}
     drawn.rockfall_simulation.contact = "points"
     assert not part("rockfall_addon.scene.simulation_setup").plan(drawn).check_mesh, "points have no mesh"
+
+
+@pytest.mark.parametrize(("contact", "diameter"), [("mesh", 0.5), ("points", 12.0)])
+def test_the_exported_project_is_the_same_scenario(scan: bpy.types.Scene, part, tmp_path, contact, diameter) -> None:
+    settings = scan.rockfall_simulation
+    settings.source, settings.steeper_than_deg, settings.number, settings.seed = "STEEP", 33.0, 6, 5
+    settings.contact, settings.diameter_m, settings.models = contact, diameter, MODELS
+    settings.trees, settings.stems_per_hectare = "DRAWN", 200.0
+    scan.rockfall_parameters.noel_2017.rt = 0.41
+    shown = exact(part, scan)
+    assert bpy.ops.rockfall.export_project(directory=str(tmp_path / "out")) == {"FINISHED"}
+    file = tmp_path / "out" / "project.toml"
+    project = part("core.exchange.project").read_project(file)
+    scenario, _ = part("core.workflow.scenarios").open_simulation(project, file)
+    stated = {one.settings.model: one for one in part("core.workflow.simulation").run_scenario(scenario)}
+    assert stated.keys() == shown.keys() == MODELS
+    for model, one in stated.items():
+        assert len(one) == len(shown[model]) == 6
+        np.testing.assert_array_equal(one.position, shown[model].position)
+        np.testing.assert_array_equal(one.settings.trees.position, shown[model].settings.trees.position)

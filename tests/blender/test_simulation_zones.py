@@ -98,7 +98,7 @@ def test_a_project_keeps_the_zones(scan: bpy.types.Scene, part, tmp_path) -> Non
     before = plan(part, scan).scenario
     path, _ = project.save_project(scan, tmp_path / "project")
 
-    core = part("core.exchange.simulation_project")
+    core = part("core.workflow.scenarios")
     stated = core.open_simulation(part("core.exchange.project").read_project(path), path)[0]
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     project.load_project(bpy.context.scene, path)

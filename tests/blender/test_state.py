@@ -151,7 +151,7 @@ def test_the_film_of_the_panel_goes_with_the_project(scene: bpy.types.Scene, par
 def test_the_command_line_takes_an_exported_project(scene: bpy.types.Scene, part, tmp_path: Path, numbers) -> None:
     out = tmp_path / "out"
     path, _ = part("rockfall_addon.scene.project").save_project(scene, out)
-    _, result = part("core.exchange.opening").open_project(part("core.exchange.project").read_project(path))
+    _, result = part("core.workflow.opening").open_project(part("core.exchange.project").read_project(path))
     stored = [list(numbers(o)["incident_mps"]) for o in picks_of(scene, "A")[1:4]]
     np.testing.assert_allclose(result.impacts.v1[:3], stored, atol=1e-9)
 

@@ -11,7 +11,7 @@ import pytest
 @pytest.fixture
 def demo(part):
     """The core's surface, picks and shading of the demo, and the modules that are needed."""
-    opening, project = part("core.exchange.opening"), part("core.exchange.project")
+    opening, project = part("core.workflow.opening"), part("core.exchange.project")
     surface, result = opening.open_project(project.read_project(part("rockfall_addon.steps.start.operators").DEMO))
     return surface, result
 

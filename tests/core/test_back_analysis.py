@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rockfall.core.analysis.back_analysis import BackAnalysis
 from rockfall.core.analysis.completeness import (
     ShortRuns,
     completeness_remarks,
@@ -38,7 +39,7 @@ from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import Releases, make_releases, placed_on
 from rockfall.core.terrain.surface import Surface
-from rockfall.core.workflow.back_analysis import BackAnalysis, back_analyse, observe_values, posterior_settings
+from rockfall.core.workflow.back_analysis import back_analyse, observe_values, posterior_settings
 from scipy.stats import norm
 
 MODEL = "pfeiffer_bowen_1989"

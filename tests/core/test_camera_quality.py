@@ -12,12 +12,12 @@ from rockfall.core.camera.quality import PARAMETERS, CameraQuality, from_plain, 
 from rockfall.core.cli import main
 from rockfall.core.errors import InputError
 from rockfall.core.exchange.cameras import read_camera, read_pairs, write_camera
-from rockfall.core.exchange.opening import camera_remarks, read_project_camera
 from rockfall.core.exchange.project import read_project
 from rockfall.core.film.composed.material import open_material
 from rockfall.core.film.composed.request import FilmRequest
 from rockfall.core.georeference import Z_UP
 from rockfall.core.workflow.alignment import AlignmentOptions, align
+from rockfall.core.workflow.opening import camera_remarks, read_project_camera
 
 DEMO = Path(__file__).parents[2] / "assets" / "demo" / "footage"
 SIZE = (1280, 720)

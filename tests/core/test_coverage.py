@@ -8,7 +8,6 @@ import pytest
 from rockfall.core.errors import InputError
 from rockfall.core.exchange.project import BlockEntry
 from rockfall.core.exchange.simulation_entry import ReleaseEntry, SimulationEntry, TreesEntry
-from rockfall.core.exchange.simulation_project import placed_source
 from rockfall.core.exchange.trees import open_trees
 from rockfall.core.exchange.zones import read_zones
 from rockfall.core.georeference import GlobalShift
@@ -20,6 +19,7 @@ from rockfall.core.simulation.polygons import Polygon
 from rockfall.core.simulation.release_sources import in_polygon, on_line
 from rockfall.core.terrain.cloud import Cloud
 from rockfall.core.terrain.surface import Surface
+from rockfall.core.workflow.scenarios import placed_source
 from rockfall.core.workflow.screens import outside_remarks
 
 

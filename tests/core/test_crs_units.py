@@ -148,8 +148,8 @@ def lengths(*values: float) -> GeoDoubleParamsVlr:
 
 def test_the_system_that_a_project_states_has_a_unit(tmp_path):
     """Of files that state none; the shift is in metres, and so is what is written."""
-    from rockfall.core.exchange.opening import open_terrain
     from rockfall.core.exchange.project import read_project, write_project
+    from rockfall.core.workflow.opening import open_terrain
 
     np.savetxt(tmp_path / "a.xyz", POINTS)
 

@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
-from rockfall.core.exchange.design_page import provenance, tables_of, write_design
-from rockfall.core.exchange.opening import open_project
 from rockfall.core.exchange.partial_factors import open_factors, read_factors, shipped_names
 from rockfall.core.exchange.project import read_project
 from rockfall.core.georeference import GlobalShift
@@ -20,8 +18,10 @@ from rockfall.core.simulation.parameter_draws import ParameterDraws
 from rockfall.core.simulation.release import Releases, make_releases
 from rockfall.core.simulation.trees import random_trees
 from rockfall.core.terrain.surface import Surface
+from rockfall.core.workflow.design_page import provenance, tables_of, write_design
 from rockfall.core.workflow.design_sheet import DesignSheet, design_sheet, evidence_of
 from rockfall.core.workflow.enough import in_chance_order
+from rockfall.core.workflow.opening import open_project
 from scipy.stats import binomtest
 
 DEMO = Path(__file__).parents[2] / "assets" / "demo" / "project.toml"

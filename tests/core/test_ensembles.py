@@ -15,10 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rockfall.core.errors import InputError
-from rockfall.core.exchange.chunk_store import ChunkStore
 from rockfall.core.exchange.content_digest import content_digest
-from rockfall.core.exchange.simulation_chunks import simulate_in_chunks, write_chunk_tables
-from rockfall.core.exchange.simulation_output import write_simulations, write_tables
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.hazard.run_tally import RunTally
 from rockfall.core.hazard.screens import Screen
@@ -30,8 +27,11 @@ from rockfall.core.simulation.release import Releases
 from rockfall.core.simulation.release_sources import on_points
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow import ensembles
+from rockfall.core.workflow.chunk_store import ChunkStore
 from rockfall.core.workflow.ensembles import HereAlone, Work, run_ensemble
 from rockfall.core.workflow.maps import map_models
+from rockfall.core.workflow.simulation_chunks import simulate_in_chunks, write_chunk_tables
+from rockfall.core.workflow.simulation_output import write_simulations, write_tables
 
 SETTINGS = Settings("noel_2017", seed=5)
 SIZE, RUNS = 7, 45  # the last chunk is not full
@@ -160,7 +160,7 @@ def test_work_that_is_killed_goes_on_and_gives_the_same_tables(ground, tmp_path)
         "import sys, time\nfrom pathlib import Path\n"
         f"sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
         "from test_ensembles import SETTINGS, SIZE, HereAlone, blocks_on, plane\n"
-        "from rockfall.core.exchange.simulation_chunks import simulate_in_chunks\n"
+        "from rockfall.core.workflow.simulation_chunks import simulate_in_chunks\n"
         "ground = plane()\n"
         "class Slow(HereAlone):\n"
         "    def compute(self, work, chunks, beat):\n"

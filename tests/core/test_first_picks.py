@@ -13,11 +13,11 @@ from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.refinement.views import View
+from rockfall.core.reconstruction.sightings import Events, SeenVideo, Sightings
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.vectors import norm
 from rockfall.core.workflow.first_picks import first_picks
 from rockfall.core.workflow.refinement import pixels_of, refine_picks
-from rockfall.core.workflow.sightings import Events, SeenVideo, Sightings
 
 G = np.array([0.0, 0.0, -9.81])
 DIP = np.radians(35)

@@ -10,7 +10,6 @@ import pytest
 from rockfall.core.cli import main
 from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.exchange.geopackage import FeatureLayer, write_geopackage
-from rockfall.core.exchange.opening import open_terrain
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.qgis_styles import line_style
 from rockfall.core.exchange.simulation_geopackage import measured_layer, write_simulation_geopackage
@@ -21,6 +20,7 @@ from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import make_releases
 from rockfall.core.simulation.run_lines import lines_of
 from rockfall.core.terrain.surface import Surface
+from rockfall.core.workflow.opening import open_terrain
 
 DEMO = Path(__file__).parents[2] / "assets" / "demo"
 SHIFT = GlobalShift(2_600_000.0, 1_200_000.0, 800.0, "EPSG:2056")

@@ -180,7 +180,7 @@ def test_a_camera_in_feet_is_said(tmp_path):
     from rockfall.core.camera.model import look_at
     from rockfall.core.camera.path import fixed
     from rockfall.core.exchange.cameras import write_camera
-    from rockfall.core.exchange.opening import read_project_camera
+    from rockfall.core.workflow.opening import read_project_camera
 
     terrain = square(slope(30.0))
     camera = replace(look_at(1600, 900, (-150.0, 100.0, 1600.0), (100, 100, 1400), fov_deg=50.0), shift=terrain.shift)

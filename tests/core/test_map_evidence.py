@@ -88,7 +88,7 @@ def test_a_figure_hatches_and_counts_them() -> None:
     """The hatched area is that of the cells, and the legend has the numbers."""
     pytest.importorskip("matplotlib")
     from matplotlib.patches import PathPatch
-    from rockfall.core.workflow.map_figures import BEYOND, HATCH, hillshade, map_figure, reached
+    from rockfall.core.exchange.map_figures import BEYOND, HATCH, hillshade, map_figure, reached
 
     maps, terrain = numbered(MAPS), half_plane()
     window = reached(maps)

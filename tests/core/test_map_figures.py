@@ -3,11 +3,11 @@
 
 import numpy as np
 import pytest
+from rockfall.core.exchange.map_figures import Window, hillshade, map_figure, reached, save_map_figures
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.hazard.cells import Cells
 from rockfall.core.hazard.maps import Maps
 from rockfall.core.terrain.surface import Surface
-from rockfall.core.workflow.map_figures import Window, hillshade, map_figure, reached, save_map_figures
 
 SHIFT = GlobalShift(2_600_000.0, 1_200_000.0, 0.0, "EPSG:2056")
 CELLS = Cells(0.0, 0.0, 2.0, 50, 40)

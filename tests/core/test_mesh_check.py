@@ -8,13 +8,14 @@ from rockfall.core.georeference import GlobalShift
 from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import Releases, make_releases, placed_on
+from rockfall.core.simulation.zones import Zones
 from rockfall.core.terrain.cloud import Cloud
 from rockfall.core.terrain.subdivision import subdivided
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.workflow import mesh_check
 from rockfall.core.workflow.mesh_check import change_remarks, mesh_changes, refined_ground
 from rockfall.core.workflow.mesh_fineness import fineness, fineness_remarks
-from rockfall.core.workflow.simulation import Scenario, Zones, remarks_of
+from rockfall.core.workflow.simulation import Scenario, remarks_of
 
 
 def sheet(x: np.ndarray, y: np.ndarray, height) -> Surface:
@@ -84,7 +85,7 @@ def test_the_ratio_is_always_said_and_warned_of_where_the_ground_is_curved(spaci
     assert found.diameter_m == pytest.approx(0.3)
     assert f"edges of {found.edge_m / 0.3:.2g} diameters" in remark.text
     assert remark.severity == ("warning" if coarse else "note")
-    assert ("--check-mesh" in remark.text) == coarse
+    assert ("Check the mesh" in remark.text) == coarse
 
 
 def test_points_have_no_mesh() -> None:

@@ -15,7 +15,6 @@ import rockfall
 from rockfall.core import blender_process, cli
 from rockfall.core.camera.model import rotation_from_vector
 from rockfall.core.errors import InputError, RockfallError
-from rockfall.core.exchange.opening import open_project
 from rockfall.core.exchange.project import Site, read_project
 from rockfall.core.outreach.animation import animate, known_format, load_animation, save_animation
 from rockfall.core.outreach.animator import write_animation
@@ -23,6 +22,7 @@ from rockfall.core.outreach.packing import Packing, in_reading_order, quantise
 from rockfall.core.outreach.page import MOST_BYTES, make_page, thinned
 from rockfall.core.outreach.show import Show, ShowRequest, open_show
 from rockfall.core.reconstruction.flight import flight_states
+from rockfall.core.workflow.opening import open_project
 
 ROOT = Path(rockfall.__file__).resolve().parent
 DEMO = ROOT / "assets" / "demo" / "project.toml"

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from rockfall.core.cli import main
 from rockfall.core.errors import InputError
-from rockfall.core.exchange.footage import open_entry
 from rockfall.core.exchange.project import read_project
 from rockfall.core.footage.sequences import sequence_beside, sequence_of
 from rockfall.core.footage.video import open_video, read_frame, read_frames
+from rockfall.core.workflow.footage import open_entry
 
 NUMBERS = (7, 8, 9, 11, 12)
 

@@ -13,7 +13,6 @@ from rockfall.core.colours import MEASURED_COLOUR
 from rockfall.core.commands.demo import SITE
 from rockfall.core.constants import GRAVITY_MPS2 as G
 from rockfall.core.errors import InputError, RockfallError
-from rockfall.core.exchange.opening import open_project
 from rockfall.core.exchange.predicted_flight_tables import write_predicted_flights
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.selection import rows_of
@@ -30,6 +29,7 @@ from rockfall.core.reconstruction.landing import Launches, find_landings, greate
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.trajectory import reconstruct
 from rockfall.core.terrain.surface import Surface
+from rockfall.core.workflow.opening import open_project
 
 
 def plane(slope_deg: float, half_m: float = 60.0, cells: int = 24) -> Surface:

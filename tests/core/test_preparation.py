@@ -12,7 +12,7 @@ from rockfall.core.analysis.curves import fit_curve
 from rockfall.core.analysis.graph_series import measured_series
 from rockfall.core.analysis.graphs import PAPER_GRAPHS
 from rockfall.core.analysis.preparation import prepare_fits, prepare_model
-from rockfall.core.exchange.opening import open_project
+from rockfall.core.workflow.opening import open_project
 from rockfall.core.exchange.project import read_project
 from rockfall.core.impact_models.registry import COMPARED
 from rockfall.core.kept_code import KeptCode

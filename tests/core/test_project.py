@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from rockfall.core.analysis.completeness import parse_completeness
 from rockfall.core.errors import InputError, RockfallError
-from rockfall.core.exchange.opening import open_project, open_terrain
 from rockfall.core.exchange.project import (
     BlockEntry,
     CameraPlacement,
@@ -30,6 +29,7 @@ from rockfall.core.exchange.simulation_entry import (
     ZonesEntry,
 )
 from rockfall.core.simulation.distributions import Distribution
+from rockfall.core.workflow.opening import open_project, open_terrain
 
 FULL = """
 schema = 1

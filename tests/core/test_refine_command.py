@@ -11,13 +11,13 @@ from rockfall.core.cli import main
 from rockfall.core.errors import InputError, RockfallError
 from rockfall.core.exchange.cameras import read_camera, write_camera
 from rockfall.core.exchange.csv_text import read_table
-from rockfall.core.exchange.footage import open_footage, picks_from_footage
-from rockfall.core.exchange.opening import open_project, open_terrain
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.tables import read_impacts, read_picks
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.triangulation import contact_points
 from rockfall.core.vectors import norm, unit
+from rockfall.core.workflow.footage import open_footage, picks_from_footage
+from rockfall.core.workflow.opening import open_project, open_terrain
 
 SHIFT = GlobalShift(2_600_000.0, 1_200_000.0, 1_000.0)
 DIP = np.radians(30.0)
@@ -180,7 +180,8 @@ def test_refined_picks_and_impacts_are_those_that_were_filmed(site, tmp_path, ca
     out = tmp_path / "runs" / "out"
     assert main(["refine", str(site / "project.toml"), "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    names = {"picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv", "what_if.csv", "project.toml"}
+    names = {"picks.csv", "impacts.csv", "trajectories.csv", "residuals.csv", "project.toml"}
+    names |= {"what_if.csv", "reliability.csv"}
     assert {path.name for path in out.iterdir()} == names
     check_picks(out)
     before = read_picks(site / "picks.csv", SHIFT)

@@ -12,8 +12,8 @@ from rockfall.core.footage.advice import with_repeats
 from rockfall.core.footage.repeats import repeated_pictures, repeats_sentence, rhythm
 from rockfall.core.footage.sources import repeats_at_a_glance
 from rockfall.core.footage.video import open_video
+from rockfall.core.reconstruction.sightings import Sightings
 from rockfall.core.workflow.first_picks import _late_s
-from rockfall.core.workflow.sightings import Sightings
 
 DATA = Path(__file__).parent.parent / "data"
 FIELD, VIDEOS = DATA / "field_cases" / "04-repeated-frames", DATA / "videos"

@@ -34,6 +34,7 @@ def furrowed():
 
 
 SURFACE = furrowed()
+EXACT = {"sigma_aim": 0.0, "sigma_datum": 0.0}
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +76,7 @@ def test_marks_on_another_rib_do_not_keep_the_motion_there(centre):
     setup = set_up(prepare(picks, SURFACE, BLOCK, None, None, 0.02), (view,), seen, ["a"], 9.81, frozenset())
     held_there = solve(setup.problem, setup.state, "huber")
     assert np.linalg.norm(held_there.state.centre - centre, axis=1)[1:-1].max() > 2
-    found = refine(picks, [view], seen, surface=SURFACE, block=BLOCK, sigma_terrain_m=0.02, sigma_aim=0.0)
+    found = refine(picks, [view], seen, surface=SURFACE, block=BLOCK, sigma_terrain_m=0.02, **EXACT)
     speed = np.linalg.norm(found.reconstruction.flights.start_velocity, axis=1)
     np.testing.assert_allclose(speed, np.linalg.norm(motion.start_velocity, axis=1), rtol=0.01)
     assert not any("other solution" in remark.text for remark in found.remarks)
@@ -83,7 +84,7 @@ def test_marks_on_another_rib_do_not_keep_the_motion_there(centre):
 
 def test_motions_that_cannot_be_told_apart_are_said_and_covered(centre):
     view, seen, picks, motion = filmed(centre, sigma_px=25.0, rate_hz=25.0)
-    found = refine(picks, [view], seen, surface=SURFACE, block=BLOCK, sigma_terrain_m=0.02, sigma_aim=0.0)
+    found = refine(picks, [view], seen, surface=SURFACE, block=BLOCK, sigma_terrain_m=0.02, **EXACT)
     (said,) = [remark for remark in found.remarks if "other solution" in remark.text]
     assert said.severity == "warning"
     assert said.about == "a"

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from rockfall.core.cli import main
 from rockfall.core.exchange.project import read_project
-from rockfall.core.exchange.simulation_project import open_simulation
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.impact_models.registry import COMPARED
 from rockfall.core.reconstruction.drag import Drag
 from rockfall.core.terrain.surface import Surface
 from rockfall.core.terrain.writers import write_ply
+from rockfall.core.workflow.scenarios import open_simulation
 from rockfall.core.workflow.simulation import ground_of
 
 EAST, NORTH, SLOPE = 2_600_000.0, 1_200_000.0, 0.6

@@ -10,7 +10,7 @@ from rockfall.core.simulation import engine
 from rockfall.core.simulation.engine import ENDS, Settings, simulate
 from rockfall.core.simulation.facet_kernels import _look_about
 from rockfall.core.simulation.ground import Ground, make_ground
-from rockfall.core.simulation.release import make_releases
+from rockfall.core.simulation.release import make_releases, placed_on
 from rockfall.core.terrain.cloud import Cloud
 from rockfall.core.terrain.kernels import STACK_SIZE
 from rockfall.core.terrain.raycast import closest_points
@@ -156,3 +156,50 @@ def test_drag_slows_blocks_on_the_ground_as_in_closed_form(law: str, part: float
     assert far.sum() > 20
     assert 2 * part * k * way[far].max() > 2
     np.testing.assert_allclose(speed[far], true[far], rtol=0.01)
+
+
+def noisy_plane(sigma: float) -> Surface:
+    """30° down, then flat, with a point every 10 cm that is off by as much."""
+    rng = np.random.default_rng(3)
+    line, across = np.arange(0.0, 50.0, 0.1), np.arange(0.0, 16.0, 0.1)
+    steep = np.tan(np.radians(30.0))
+    return sheet(
+        line,
+        across,
+        lambda x, y: steep * (2.0 * np.logaddexp(0.0, (x - 22.0) / 2.0) - x) + rng.normal(0, sigma, x.shape),
+    )
+
+
+@pytest.mark.parametrize(("diameter", "sigma"), [(0.3, 0.003), (1.0, 0.01)])
+def test_noise_of_a_scan_below_the_scale_of_the_block_is_no_friction(diameter: float, sigma: float) -> None:
+    """The stop is that of the energy line: drop/μ, though noel_2017 takes most of the speed at each impact."""
+    ground, friction = make_ground(noisy_plane(sigma)), 0.35
+    start = placed_on(ground, np.column_stack([np.full(5, 2.0), np.linspace(7, 9, 5)]), np.full(5, diameter))
+    way = np.array([np.cos(np.radians(30)), 0.0, -np.sin(np.radians(30))])
+    releases = make_releases(start, velocity=np.tile(way, (5, 1)), diameter_m=diameter)
+    run = simulate(ground, releases, Settings("noel_2017", friction=friction))
+    drop = start[:, 2] - run.position[:, 2]
+    head = 1.4 / (2 * GRAVITY_MPS2)  # of the start's 1 m/s and its spin
+    assert (run.end == ENDS.index("stopped")).all()
+    np.testing.assert_allclose((run.position - start)[:, 0], (drop + head) / friction, rtol=0.04)
+
+
+def test_a_sharp_kink_takes_as_much_with_noise_around() -> None:
+    """45° onto 14°: (cos T + c)/(1 + c) of the speed, whatever a point every 10 cm is off by."""
+    steep, gentle, turn, radius = 1.0, np.tan(np.radians(14.0)), np.radians(31.0), 0.15
+    stops = []
+    for sigma in (0.0, 0.002):
+        rng = np.random.default_rng(3)
+        line, across = np.arange(0.0, 60.0, 0.1), np.arange(0.0, 8.0, 0.1)
+        bent = lambda x, y: np.where(x < 5.0, 5.0 - steep * x, gentle * (5.0 - x)) + rng.normal(0, sigma, x.shape)  # noqa: E731,B023
+        ground = make_ground(sheet(line, across, bent))
+        start = placed_on(ground, np.column_stack([np.full(5, 1.0), np.linspace(3.5, 4.5, 5)]), np.full(5, 2 * radius))
+        velocity = np.tile([np.sqrt(0.5), 0.0, -np.sqrt(0.5)], (5, 1))
+        releases = make_releases(start, velocity=velocity, diameter_m=2 * radius)
+        run = simulate(ground, releases, Settings("azimi_desvarreux_1977", ROLLS, friction=0.5))
+        stops.append(float((run.position - start)[:, 0].mean()))
+    kept = ((np.cos(turn) + 0.4) / 1.4) ** 2
+    before = 1.4 / (2 * GRAVITY_MPS2) + 4.0 * (1.0 - 0.5)  # less the friction of the way to the kink
+    expected = 4.0 + kept * before / (0.5 - gentle)
+    assert stops[0] == pytest.approx(expected, rel=0.03)
+    assert stops[1] == pytest.approx(stops[0], rel=0.05)

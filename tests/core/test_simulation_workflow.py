@@ -13,8 +13,9 @@ from rockfall.core.simulation import engine, memory
 from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import Ground, make_ground
 from rockfall.core.simulation.release import Releases, make_releases, placed_on
+from rockfall.core.simulation.zones import Zones
 from rockfall.core.terrain.surface import Surface
-from rockfall.core.workflow.simulation import Scenario, Zones, ground_of, remarks_of, run_models, run_scenario
+from rockfall.core.workflow.simulation import Scenario, ground_of, remarks_of, run_models, run_scenario
 
 MODELS = {"noel_2017": {}, "azimi_desvarreux_1977": {"rn": 0.3}}
 

@@ -11,8 +11,8 @@ from rockfall.core.errors import InputError
 from rockfall.core.reconstruction.block import Block
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.reconstruction.refinement.views import View
+from rockfall.core.reconstruction.spin_marks import MarkedVideo, SpinMarks
 from rockfall.core.reconstruction.trajectory import reconstruct
-from rockfall.core.workflow.spin_marks import MarkedVideo, SpinMarks
 from rockfall.core.workflow.spins import measure_spins, with_spins
 from scipy.spatial.transform import Rotation
 

@@ -15,10 +15,10 @@ from rockfall.core.analysis.graphs import GraphSpec
 from rockfall.core.analysis.group_statistics import group_by_text
 from rockfall.core.cli import main
 from rockfall.core.commands.demo import SITE
-from rockfall.core.exchange.opening import open_project
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.selection import rows_of
 from rockfall.core.exchange.tables import write_impacts
+from rockfall.core.workflow.opening import open_project
 
 TABLES = {"statistics.csv", "angle_classes.csv", "summary.json"}
 OF_GROUPS = {"groups.csv", "group_tests.csv", "group_pairs.csv"}

@@ -14,7 +14,6 @@ from rockfall.core.analysis.scores import scores
 from rockfall.core.commands import simulate as command
 from rockfall.core.commands.demo import SITE
 from rockfall.core.exchange.comparison_tables import write_predictions, write_scores
-from rockfall.core.exchange.opening import open_project
 from rockfall.core.exchange.predicted_flight_tables import write_predicted_flights
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.simulated_motion import write_simulated_impacts, write_simulated_trajectories
@@ -27,6 +26,7 @@ from rockfall.core.simulation.engine import Settings, simulate
 from rockfall.core.simulation.ground import make_ground
 from rockfall.core.simulation.release import make_releases
 from rockfall.core.terrain.surface import Surface
+from rockfall.core.workflow.opening import open_project
 
 MANUAL = Path(__file__).parents[2] / "docs" / "manual" / "tables.md"
 SIMULATED = MANUAL.with_name("simulation_tables.md")

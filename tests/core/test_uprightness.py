@@ -10,13 +10,13 @@ from rockfall.core.camera.pairs import Pairs
 from rockfall.core.camera.path import fixed
 from rockfall.core.cli import main
 from rockfall.core.exchange.cameras import write_camera
-from rockfall.core.exchange.opening import open_project, read_project_camera
 from rockfall.core.exchange.project import read_project
 from rockfall.core.exchange.tables import read_impacts, read_picks
 from rockfall.core.georeference import GlobalShift
 from rockfall.core.reconstruction.picks import make_picks
 from rockfall.core.terrain.opening import HowToRead
 from rockfall.core.terrain.readers import read_terrain, read_tiles
+from rockfall.core.workflow.opening import open_project, read_project_camera
 from rockfall.core.workflow.uprightness import turned_camera, turned_pairs, turned_picks
 
 EAST, NORTH, UP = 2_600_000.0, 1_200_000.0, 500.0

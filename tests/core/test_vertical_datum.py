@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 import tifffile
 from rockfall.core.errors import InputError
-from rockfall.core.exchange.opening import open_terrain
 from rockfall.core.exchange.project import read_project, write_project
+from rockfall.core.workflow.opening import open_terrain
 
 GRID = "ncols 4\nnrows 3\nxllcorner 988400\nyllcorner 6375600\ncellsize 1\n" + "1500 1501 1502 1503\n" * 3
 

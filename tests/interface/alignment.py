@@ -17,7 +17,7 @@ def start(window):
     """The demo's terrain, its footage, and both side by side."""
     yield from window.show_sidebar()
     scene = bpy.context.scene
-    opening, project = window.part("core.exchange.opening"), window.part("core.exchange.project")
+    opening, project = window.part("core.workflow.opening"), window.part("core.exchange.project")
     surface, result = opening.open_project(project.read_project(DEMO / "project.toml"))
     window.part("rockfall_addon.scene.georeference").write_shift(scene, result.picks.shift)
     shading = window.part("core.terrain.shading").shade(surface)

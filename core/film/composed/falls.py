@@ -9,13 +9,13 @@ import numpy as np
 
 from ...analysis.predicted_flights import PredictedFlights
 from ...camera.model import rotation_from_vector
-from ...exchange.footage import UNREFINED
 from ...reconstruction.block import Block
 from ...reconstruction.sampling import TrajectorySamples, sample_trajectories
 from ...reconstruction.trajectory import Reconstruction
 from ...simulation.engine import IMPACT, Simulation
 from ...simulation.results import sample_runs
 from ...vectors import Array, Indices, norm
+from ...workflow.footage import UNREFINED
 from .look import MEASURED, Colour
 
 STEP_S = 1 / 120

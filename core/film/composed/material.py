@@ -11,8 +11,6 @@ import numpy as np
 from ...analysis.comparison import compare
 from ...analysis.predicted_flights import PredictedFlights, fly_predictions
 from ...errors import InputError
-from ...exchange.footage import UNREFINED, clock_of, measured_in, open_entry
-from ...exchange.opening import blocks_of, camera_remarks, open_terrain, read_project_camera
 from ...exchange.project import Project, VideoEntry, read_project
 from ...impact_models.registry import COMPARED, find_model
 from ...progress import Progress, silent
@@ -21,6 +19,8 @@ from ...simulation.measured_releases import start_times
 from ...terrain.readers import read_terrain
 from ...terrain.surface import Surface
 from ...vectors import Array
+from ...workflow.footage import UNREFINED, clock_of, measured_in, open_entry
+from ...workflow.opening import blocks_of, camera_remarks, open_terrain, read_project_camera
 from ...workflow.simulation import remarks_of
 from ..falls import fall_beside
 from ..job import FilmJob

@@ -20,7 +20,7 @@ MATTERS = 1.2
 """A cause that makes deviations larger by this factor is spoken of."""
 EXACT = 1e-3
 """Of the terrain's accuracy, for what the deviations would be without it."""
-WRONG = 2.0
+WRONG = 1.5
 """A terrain that is off by so many times what was stated is."""
 GRAVITY_OFF, GRAVITY_SIGNIFICANCE = 0.1, 5.0
 """Gravity that is off by more than this part, and by more than so many standard deviations, is no gravity."""
@@ -102,13 +102,15 @@ def _on_terrain(ground: Ground, fits: Sequence[Fit]) -> Iterator[Remark]:
     touching = [fit for fit in fits if fit.setup.problem.surface is not None and fit.setup.problem.grounded.size]
     if not touching:
         return
-    scale = float(np.median([fit.setup.problem.ground.terrain_scale for fit in touching]))
-    accuracy, found = 100 * ground.sigma_terrain_m, 100 * scale * ground.sigma_terrain_m
+    errors = [fit.setup.problem.ground for fit in touching]
+    scale = float(np.median([np.median(one.own_sigma_m / one.scaled(1.0, 1.0).own_sigma_m) for one in errors]))
+    off = 100 * float(np.median([np.median(one.own_sigma_m) for one in errors]))
+    accuracy = 100 * ground.sigma_terrain_m
     stated = "stated" if ground.terrain_stated else "taken by its point spacing"
     if scale > WRONG and not any(fit.accelerations for fit in fits):
         text = (
-            f"The terrain is off by about {found:.2g} cm where blocks touch it, not by the {accuracy:.2g} cm {stated}, "
-            "which the deviations allow for: check how it and the cameras lie to each other."
+            f"The terrain is off by about {off:.2g} cm where blocks touch it, not by the {accuracy:.2g} cm {stated}, "
+            "which the deviations allow for: check the terrain, and how it and the cameras lie to each other."
         )
         yield Remark(text, "warning", "terrain")
     elif not ground.terrain_stated:

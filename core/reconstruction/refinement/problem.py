@@ -95,7 +95,7 @@ class Problem:
     sigma_aim : standard deviation of the aim, in parts of the block's diameter.
     position, rotation : (m, 3), (m, 3, 3) prior pose of the camera when each pixel was taken.
     time_s, sigma_time_s : (n,) prior times of the nodes.
-    centre, sigma_centre_m : (n, 3), (n,) prior places.
+    centre, centre_whitening : (n, 3), (n, 3, 3) prior places, and roots of the inverse of their covariance.
     grounded : (g,) nodes on the ground; radius_m (g,) of the block, ground : errors of their distance from it.
     surface : the terrain.
     pass_segment, pass_time_s, pass_position, pass_sigma_m : (p,), (p,), (p, 3), (p,) places marked in flight.
@@ -124,7 +124,7 @@ class Problem:
     time_s: Array
     sigma_time_s: Array
     centre: Array
-    sigma_centre_m: Array
+    centre_whitening: Array
     grounded: Indices
     radius_m: Array
     ground: GroundErrors
@@ -402,10 +402,9 @@ def _time_rows(problem: Problem, state: Unknowns) -> Rows:
 
 
 def _centre_rows(problem: Problem, state: Unknowns) -> Rows:
-    nodes = np.flatnonzero(np.isfinite(problem.sigma_centre_m))
-    weight = 1 / problem.sigma_centre_m[nodes]
-    residual = (state.centre - problem.centre)[nodes] * weight[:, None]
-    return Rows(residual, weight[:, None, None] * np.eye(3), NODE * nodes[:, None] + np.arange(3))
+    nodes, white = np.arange(len(problem.centre)), problem.centre_whitening
+    residual = (white @ (state.centre - problem.centre)[:, :, None])[:, :, 0]
+    return Rows(residual, white, NODE * nodes[:, None] + np.arange(3))
 
 
 def ground_distances(surface: Surface, centre: Array) -> tuple[Array, Array]:

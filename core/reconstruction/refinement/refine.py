@@ -11,7 +11,7 @@ from ...constants import GRAVITY_MPS2
 from ...errors import InputError, RockfallError
 from ...progress import Progress, part, silent
 from ..block import Block, per_pick
-from ..choices import FREE, LOSSES, SIGMA_AIM, Loss
+from ..choices import FREE, LOSSES, SIGMA_AIM, SIGMA_DATUM, Loss
 from ..drag import Drag
 from ..picks import Picks
 from ..placement import check_placement
@@ -42,6 +42,7 @@ def refine(
     free: Sequence[str] = (),
     sigma_terrain_m: float | None = None,
     sigma_aim: float = SIGMA_AIM,
+    sigma_datum: float = SIGMA_DATUM,
     loss: Loss = "huber",
     site: str = "",
     progress: Progress = silent,
@@ -65,6 +66,9 @@ def refine(
         quarter of the point spacing times the spread of the terrain's normals (what lies between the points).
     sigma_aim : standard deviation of what all pixels of a trajectory in a view are off the block's centre by, alike, in
         parts of its diameter; 0 takes the pixels for the centre's.
+    sigma_datum : standard deviation of how each camera that has a covariance lies to the terrain beside it, in parts of
+        its distance; 0 takes both for of one survey. The mean of all cameras counts: what one is off by itself, the
+        others show.
     loss : how pixels that do not fit count; "linear" trusts all of them.
 
     Raises
@@ -91,6 +95,8 @@ def refine(
     free_set = _check_parameters(free, loss, gravity_mps2, sigma_terrain_m, normal_radius_m)
     if not (np.isfinite(sigma_aim) and sigma_aim >= 0):
         raise RockfallError(f"The standard deviation of the aim must be a number not below zero, not {sigma_aim}.")
+    if not (np.isfinite(sigma_datum) and sigma_datum >= 0):
+        raise RockfallError(f"The standard deviation of the datum must be a number not below zero, not {sigma_datum}.")
     if surface is not None:
         picks = picks.in_shift(surface.shift)
         check_placement(picks, surface, per_pick(picks, block, lambda one: one.diameter_m))
@@ -107,11 +113,12 @@ def refine(
     ground = prepare(picks, surface, block, drag, normal_radius_m, sigma_terrain_m)
     names = [name for name in dict.fromkeys(picks.trajectory.tolist()) if name in set(observations.trajectory.tolist())]
     groups = [names] if free_set else [[name] for name in names]
-    setups = [set_up(ground, moved_views, observations, group, gravity_mps2, free_set, sigma_aim) for group in groups]
+    errors = sigma_aim, sigma_datum
+    setups = [set_up(ground, moved_views, observations, group, gravity_mps2, free_set, *errors) for group in groups]
     clock = free_set & {"clock", "clock_drift"}
 
     def alone(name: str) -> Setup:
-        return set_up(ground, moved_views, observations, [name], gravity_mps2, clock, sigma_aim)
+        return set_up(ground, moved_views, observations, [name], gravity_mps2, clock, *errors)
 
     count = len(setups)
     parts = [progress] if count == 1 else [part(progress, i, count) for i in range(count)]

@@ -23,6 +23,7 @@ from .advice import remarks_on
 from .deviations import Fit, centre_rows, velocity_rows
 from .ground_errors import terrain_tilt
 from .problem import NODE, evaluate
+from .reliability import Statement, on_statements, reliability
 from .setup import Ground
 from .views import PixelObservations, View
 from .what_if import WhatIf, on_drag, what_if
@@ -52,6 +53,7 @@ class Refinement:
     unknowns : fitted values with their standard deviations: gravity_mps2, drag_coefficient, "offset_s NAME",
         "drift NAME".
     what_if : what would change if an input were otherwise.
+    statements : what was stated against the pixels, and how large an error of it they would not show.
     iterations : the most that a trajectory took.
     converged : every search has come to its end.
     remarks : on where it rests on little, and what does not fit; about the trajectory or the clock.
@@ -69,6 +71,7 @@ class Refinement:
     aim: Mapping[tuple[str, str], tuple[Array, Array]]
     unknowns: Mapping[str, tuple[float, float]]
     what_if: tuple[WhatIf, ...]
+    statements: tuple[Statement, ...]
     iterations: int
     converged: bool
     remarks: tuple[Remark, ...]
@@ -111,7 +114,7 @@ def summarise(
             target[fit.setup.rows[used]] = (found.pixels.residual * problem.sigma_px[:, None])[used]
         outlier[fit.setup.rows] = fit.solution.outlier
     good = ~outlier
-    what = what_if(fits, made.impacts, ground.sigma_terrain_m)
+    what, statements = what_if(fits, made.impacts, ground.sigma_terrain_m), reliability(fits)
     by_view = [_rms(residual[good & (observations.view == i)]) for i in range(len(views))]
     return Refinement(
         picks=picks,
@@ -126,9 +129,14 @@ def summarise(
         aim={key: value for fit in fits for key, value in _aim(views, fit).items()},
         unknowns=_unknowns(views, fits[0]),
         what_if=what,
+        statements=statements,
         iterations=max(fit.solution.iterations for fit in fits),
         converged=all(fit.solution.settled for fit in fits),
-        remarks=(*remarks_on(ground, views, observations, residual, outlier, fits), *on_drag(what)),
+        remarks=(
+            *remarks_on(ground, views, observations, residual, outlier, fits),
+            *on_statements(statements),
+            *on_drag(what),
+        ),
     )
 
 
@@ -205,7 +213,7 @@ def _with_sigmas(
             axis=1,
         )
         covariance[mine] = slope @ fit.covariance @ np.swapaxes(slope, 1, 2)
-        accuracy = problem.ground.terrain_scale * np.nan_to_num(sigma_terrain_m)
+        accuracy = problem.ground.tilting_scale * np.nan_to_num(sigma_terrain_m)
         tilt[mine] = np.hypot(tilt[mine], terrain_tilt(accuracy, 2 * normals.radius_m[own[mine]]))
     given = np.isnan(impacts.normal_spread)
     spread = np.where(given, normals.spread[own], impacts.normal_spread)

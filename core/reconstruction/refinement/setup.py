@@ -9,13 +9,14 @@ import numpy as np
 from ...errors import InputError
 from ...terrain.raycast import closest_points
 from ...terrain.surface import Surface
-from ...vectors import Array, Indices, Mask, norm
+from ...vectors import Array, Indices, Mask, dot, norm, unit
 from ..block import Block, per_pick
 from ..chains import Segments, find_segments
 from ..drag import Drag
 from ..motion import GROUNDED
 from ..picks import Picks
 from ..placement import GroundNormals, pick_normals
+from ..triangulation import GRAZING_DEG
 from .contact_pixels import while_landed
 from .ground_errors import ground_errors
 from .problem import Problem, Unknowns, free_columns
@@ -149,6 +150,7 @@ def set_up(
     gravity_mps2: float,
     free: frozenset[str],
     sigma_aim: float = 0.0,
+    sigma_datum: float = 0.0,
 ) -> Setup:
     """The joint problem of some trajectories.
 
@@ -185,7 +187,7 @@ def set_up(
     for i, view in enumerate(views):
         position[seen.view == i], rotation[seen.view == i] = view.path.poses_at(seen.time_s[seen.view == i])
     on_ground = np.flatnonzero(ground.grounded[nodes])
-    given_time, given_place = picks.sigma_time_s[nodes], picks.sigma_position_m[nodes]
+    given_time = picks.sigma_time_s[nodes]
     problem = Problem(
         views=views,
         first=node_of[first_pick],
@@ -208,7 +210,7 @@ def set_up(
         time_s=picks.time_s[nodes],
         sigma_time_s=np.where(given_time > 0, given_time, SIGMA_FRAMES * _frame_s(views, seen)),
         centre=centre,
-        sigma_centre_m=np.where(given_place > 0, given_place, SIGMA_CENTRE_M),
+        centre_whitening=_places_whitening(ground, views, seen, nodes, centre),
         grounded=on_ground,
         radius_m=ground.radius_m[nodes[on_ground]],
         ground=ground_errors(
@@ -216,6 +218,7 @@ def set_up(
             ground.normals.normal[nodes[on_ground]],
             ground.sigma_m[nodes[on_ground]],
             ground.sigma_terrain_m,
+            sigma_datum * _reach_m(views, seen, centre.mean(axis=0)),
         ),
         surface=ground.surface,
         pass_segment=passes[0],
@@ -254,6 +257,31 @@ def _passes(picks: Picks, segments: Segments, chosen: Indices) -> tuple[Indices,
     return segment[known], pick[known]
 
 
+def _places_whitening(
+    ground: Ground, views: tuple[View, ...], seen: PixelObservations, nodes: Indices, centre: Array
+) -> Array:
+    """(nodes, 3, 3) roots of the inverse of the covariances of marked places.
+
+    A place that was marked in a picture is known across its ray as stated, and on the ground along the ray by so much
+    less as the ray grazes it; in which picture it was is not known, and taken for the one that sees it flattest.
+    """
+    given = ground.picks.sigma_position_m[nodes]
+    stated = given > 0
+    white = np.eye(3) / np.where(stated, given, SIGMA_CENTRE_M)[:, None, None]
+    normal = ground.normals.normal[nodes]
+    at = np.flatnonzero(stated & ground.grounded[nodes] & np.isfinite(normal[:, 0]))
+    places = np.array([views[i].path.reference.position for i in np.unique(seen.view)])
+    if not at.size or not len(places):
+        return white
+    rays = unit(centre[at] - places[:, None])
+    steepness = np.abs((rays * normal[at]).sum(axis=2))
+    flattest = steepness.argmin(axis=0), np.arange(at.size)
+    ray, rise = rays[flattest], np.maximum(steepness[flattest], np.sin(np.radians(GRAZING_DEG)))
+    along = unit(ray - dot(ray, normal[at])[:, None] * normal[at])
+    white[at] += (along[:, :, None] * along[:, None, :]) * ((rise - 1) / given[at])[:, None, None]
+    return white
+
+
 def _whitening(views: tuple[View, ...], middle: Array) -> Array:
     """(v, 6, 6) of the poses' covariances, or of what is usual at such a distance from the motion."""
     result = np.zeros((len(views), 6, 6))
@@ -261,6 +289,16 @@ def _whitening(views: tuple[View, ...], middle: Array) -> Array:
         covariance = view.solved_covariance(float(norm(middle - view.path.reference.position)))
         result[i] = np.linalg.inv(np.linalg.cholesky(covariance))
     return result
+
+
+def _reach_m(views: tuple[View, ...], seen: PixelObservations, middle: Array) -> float:
+    """Distance from the cameras [m]: of such parts of each, which are of no other's, what their mean is off.
+
+    What is taken for a view without a covariance holds this error already.
+    """
+    used = [views[i] for i in np.unique(seen.view)]
+    away = [float(norm(middle - one.path.reference.position)) for one in used if one.pose_covariance is not None]
+    return float(np.sqrt(np.square(away).sum())) / max(len(used), 1)
 
 
 def _frame_s(views: tuple[View, ...], seen: PixelObservations) -> float:

@@ -89,7 +89,7 @@ def what_if(fits: Sequence[Fit], impacts: Impacts, sigma_terrain_m: float) -> tu
     rows = [_stated(impacts, name) for fit in fits for name in fit.setup.names]
     for fit in fits:
         problem, solution = fit.setup.problem, fit.solution
-        before, after = _flights_at_impacts(fit)
+        before, after = flights_at_impacts(fit)
         unchanged = _refitted(_Change("", "", problem, solution.state), solution)
         if unchanged is None:
             continue
@@ -164,7 +164,7 @@ def _median_and_most(values: Array) -> tuple[float, float]:
     return (float(np.median(known)), float(known[np.abs(known).argmax()])) if known.size else (np.nan, np.nan)
 
 
-def _flights_at_impacts(fit: Fit) -> tuple[Indices, Indices]:
+def flights_at_impacts(fit: Fit) -> tuple[Indices, Indices]:
     """(q,) flights that end and that begin at each impact with one of them; −1 for none."""
     problem, setup = fit.setup.problem, fit.setup
     before, after = np.full(setup.nodes.size, -1), np.full(setup.nodes.size, -1)

@@ -6,7 +6,6 @@ from pathlib import Path
 import bpy
 
 from ....core.errors import InputError, RockfallError
-from ....core.exchange.opening import camera_remarks
 from ....core.exchange.project import Project, RenderPreset, read_project
 from ....core.film.check import check_film, check_picture
 from ....core.film.engines import MEASURED
@@ -17,6 +16,7 @@ from ....core.film.presets import HD, FilmTiming, find_preset
 from ....core.progress import Progress
 from ....core.reconstruction.trajectory import Reconstruction
 from ....core.simulation.measured_releases import start_times
+from ....core.workflow.opening import camera_remarks
 from ....core.workflow.simulation import remarks_of
 from ...scene import models, problems, simulation
 from ...scene.project import load_project

@@ -9,8 +9,8 @@ from collections.abc import Collection
 import bpy
 
 from ....core.errors import RockfallError
-from ....core.exchange.opening import drag_of
 from ....core.progress import Progress
+from ....core.workflow.opening import drag_of
 from ....core.workflow.refinement import Refined, refine_picks
 from ...scene import camera_paths, picks, proposal, reconstruction, sightings, store, sync, terrain, videos
 from ...view import job

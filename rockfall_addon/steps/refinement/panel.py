@@ -73,7 +73,8 @@ def _draw_proposal(context: bpy.types.Context, layout: bpy.types.UILayout, found
         row.label(text=f"{change.later_ms:+.0f} ± {change.sigma_ms:.0f}")
     if len(found.changes) > MOST_ROWS:
         column.label(text=f"… and {len(found.changes) - MOST_ROWS} more")
-    _draw_what_if(box, found)
+    _draw_table(box, ("What if: at most", "Speed", "R"), found.what_if)
+    _draw_table(box, ("Not detectable below", "", "Speed"), found.unnoticed)
     show_remarks(context, box, [remark for remark in found.remarks if remark not in grave])
     paragraph(context, box, "The proposed flights are drawn in light blue.")
     row = box.row(align=True)
@@ -81,12 +82,12 @@ def _draw_proposal(context: bpy.types.Context, layout: bpy.types.UILayout, found
     row.operator("rockfall.discard_refinement", text="Discard", icon="X")
 
 
-def _draw_what_if(layout: bpy.types.UILayout, found: Proposal) -> None:
-    """What would change at most, if an input were otherwise."""
-    if not found.what_if:
+def _draw_table(layout: bpy.types.UILayout, head: tuple[str, str, str], rows: tuple[tuple[str, str, str], ...]) -> None:
+    """What would change at most, if an input were otherwise; or what of it would not be noticed."""
+    if not rows:
         return
     column = layout.column(align=True)
-    for name, *values in (("What if: at most", "Speed", "R"), *found.what_if):
+    for name, *values in (head, *rows):
         numbers(column, name, values, 0.5)
 
 

@@ -6,10 +6,10 @@ from bpy.props import BoolProperty, StringProperty
 
 from ....core.exchange.face_maps import write_face_maps
 from ....core.exchange.map_output import draw_maps, write_maps
-from ....core.exchange.simulation_output import WITH_BARRIERS
 from ....core.impact_models.registry import find_model
 from ....core.output import output_folder
 from ....core.progress import Progress
+from ....core.workflow.simulation_output import WITH_BARRIERS
 from ...scene import georeference, hazard_maps, simulation_setup, store
 from ...view import job
 from ...view.job import InBackground, Work

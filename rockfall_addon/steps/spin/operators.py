@@ -7,7 +7,7 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ....core.errors import RockfallError
-from ....core.workflow.spin_marks import AXES, AXIS_WORDS
+from ....core.reconstruction.spin_marks import AXES, AXIS_WORDS
 from ...scene import camera_paths, clocks, pictures, places, spins, store, sync, videos
 from ...scene.spins import Measured
 from ...view import pointing, tool_header

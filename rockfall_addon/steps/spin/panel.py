@@ -3,7 +3,7 @@
 
 import bpy
 
-from ....core.workflow.spin_marks import AXIS_WORDS
+from ....core.reconstruction.spin_marks import AXIS_WORDS
 from ...scene import places, spins, store, videos
 from ...scene.spins import Measured
 from ...view.panel import RockfallPanel, advise, facts, field, paragraph

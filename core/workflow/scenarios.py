@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From project.toml to a scenario: its terrain, structures, releases and models."""
+"""Scenarios of simulations: the one place where what is stated becomes one, and the scenario of a project.
 
-from collections.abc import Iterator
+The command line without a project, observed runs and Blender read the parts themselves, and hand them to
+`make_scenario`.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +14,17 @@ import numpy as np
 
 from ..analysis.measured_rebounds import measured_rebounds
 from ..errors import InputError
+from ..exchange.map_shapes import polygon_of, read_lines, read_polygons
+from ..exchange.parameters import checked_parameters
+from ..exchange.posterior_tables import posteriors_of
+from ..exchange.project import BlockEntry, Project, ReconstructionSettings
+from ..exchange.screens import screens_of
+from ..exchange.simulation_entry import LINE, MEASURED, POINTS, POLYGON, STEEP, TABLE, ReleaseEntry, SimulationEntry
+from ..exchange.simulation_tables import read_releases
+from ..exchange.tables import read_impacts
+from ..exchange.trees import open_trees
+from ..exchange.zones import open_zones
+from ..hazard.screens import Screen
 from ..impact_models.machinery.measured import MeasuredRebounds
 from ..impact_models.registry import COMPARED, find_model
 from ..progress import Progress, silent
@@ -21,28 +36,75 @@ from ..simulation.blocks import Blocks
 from ..simulation.distributions import Distribution
 from ..simulation.ground import Ground
 from ..simulation.measured_releases import from_reconstruction
+from ..simulation.parameter_draws import ParameterDraws
 from ..simulation.polygons import Polygon
 from ..simulation.release import Releases
 from ..simulation.release_sources import in_polygon, on_line, on_points, steeper_than
+from ..simulation.zones import Zones
 from ..terrain.cloud import Cloud
 from ..terrain.readers import read_structure, read_tile_points
 from ..terrain.surface import Surface
-from ..workflow.simulation import ReleaseSource, Scenario
 from .footage import measured_in
-from .map_shapes import polygon_of, read_lines, read_polygons
 from .opening import open_terrain, read_project_picks, reconstruct_project
-from .parameters import checked_parameters
-from .posterior_tables import posteriors_of
-from .project import BlockEntry, Project
-from .screens import screens_of
-from .simulation_entry import LINE, MEASURED, POINTS, POLYGON, STEEP, TABLE, ReleaseEntry, SimulationEntry
+from .simulation import ReleaseSource, Scenario
 from .simulation_output import recorded_for
-from .simulation_tables import read_releases
-from .tables import read_impacts
-from .trees import open_trees
-from .zones import open_zones
 
 SAME_TIME_S = 1e-6
+
+
+def make_scenario(
+    entry: SimulationEntry,
+    how: ReconstructionSettings,
+    met: Surface | Cloud,
+    releases: ReleaseSource,
+    parameters: Mapping[str, Mapping[str, object]],
+    *,
+    measured: MeasuredRebounds | None = None,
+    structures: Mapping[str, Surface | Cloud] | None = None,
+    screens: tuple[Screen, ...] = (),
+    zones: Zones | None = None,
+    draws: Mapping[str, ParameterDraws] | None = None,
+    more_releases: Callable[[int], ReleaseSource] | None = None,
+    progress: Progress = silent,
+) -> tuple[Scenario, dict[str, Path]]:
+    """The scenario of an entry, whose parts have been read, and the files of its trees.
+
+    Parameters
+    ----------
+    entry : models, motion, trees, seed, tables. Its files of releases, structures, screens, zones, posterior and
+        observed impacts are given as they were read.
+    how : gravity, and the drag of air.
+    met : the terrain that blocks meet: its surface, or its points.
+    parameters : model → parameters that do not have their default; those of other models are left out.
+    releases, measured, structures, screens, zones, draws, more_releases : see `Scenario`.
+
+    Raises
+    ------
+    InputError : see `open_trees`.
+    """
+    trees, files = None, dict[str, Path]()
+    if entry.trees is not None:
+        progress("Placing the trees", 0, 0)
+        trees, files = open_trees(entry.trees, met, entry.seed)
+    scenario = Scenario(
+        met,
+        releases,
+        {name: parameters.get(name, {}) for name in entry.models},
+        measured,
+        structures=structures or {},
+        screens=screens,
+        zones=zones,
+        trees=trees,
+        rolling=entry.rolling,
+        friction=entry.friction,
+        drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,
+        gravity_mps2=how.gravity_mps2,
+        seed=entry.seed,
+        record="all" if entry.record is None else recorded_for(entry.record, bool(structures), bool(screens)),
+        draws=draws or {},
+        more_releases=more_releases,
+    )
+    return scenario, files
 
 
 def open_simulation(project: Project, file: Path, progress: Progress = silent) -> tuple[Scenario, dict[str, Path]]:
@@ -69,7 +131,8 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
         )
     entry = project.stated_simulation
     known = checked_parameters(project.extra["models"], file) if "models" in project.extra else {}
-    models = entry.models or COMPARED
+    entry = replace(entry, models=entry.models or COMPARED)
+    models = entry.models
     inputs = {"project": file, **source.inputs}
     drawing = any(find_model(name).draws_from_impacts for name in models)
     if drawing and entry.observed is not None:
@@ -90,7 +153,6 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
     for screens in entry.screens:
         if screens.file is not None:
             inputs[f"screens:{screens.file.name}"] = screens.file
-    how = project.reconstruction
     met: Surface | Cloud = terrain
     if entry.contact == "points":
         met = read_tile_points(source.files, source.how, shift=terrain.shift)
@@ -102,30 +164,21 @@ def open_simulation(project: Project, file: Path, progress: Progress = silent) -
             entry.zones.file, entry.zones.attribute, met, models,
             terrain_files=source.files, how=source.how,
         )  # fmt: skip
-    trees = None
-    if entry.trees is not None:
-        progress("Placing the trees", 0, 0)
-        trees, tree_files = open_trees(entry.trees, terrain, entry.seed)
-        inputs |= tree_files
-    scenario = Scenario(
+    scenario, tree_files = make_scenario(
+        entry,
+        project.reconstruction,
         met,
         _named_source(project, terrain, entry, file),
-        {name: known.get(name, {}) for name in models},
-        _drawn_from(project, terrain, entry) if drawing else None,
+        known,
+        measured=_drawn_from(project, terrain, entry) if drawing else None,
         structures=structures,
         screens=screens_of(entry.screens, terrain.shift),
         zones=zones,
-        trees=trees,
-        rolling=entry.rolling,
-        friction=entry.friction,
-        drag=Drag(how.air_density_kgpm3, how.drag_coefficient) if entry.drag else None,
-        gravity_mps2=how.gravity_mps2,
-        seed=entry.seed,
-        record="all" if entry.record is None else recorded_for(entry.record, bool(structures), bool(entry.screens)),
         draws=draws,
         more_releases=lambda times: _named_source(project, terrain, times_as_many(entry, times), file),
+        progress=progress,
     )
-    return scenario, inputs
+    return scenario, inputs | tree_files
 
 
 def times_as_many(entry: SimulationEntry, times: int) -> SimulationEntry:

@@ -19,13 +19,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..exchange.content_digest import content_digest
 from ..hazard.tally import Arrays
 from ..open_folders import is_folder, is_own, may_be_planted, opened
 from ..output import OTHER_FOLDER, write_bytes, write_text
 from ..reading import reader
 from ..remarks import Remark
-from ..workflow.ensembles import Chunk
-from .content_digest import content_digest
+from .ensembles import Chunk
 
 MERGED = "merged.npz"
 CHUNKS, SCENARIO, DIGEST = "chunks", "scenario", "digest"

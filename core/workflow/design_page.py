@@ -22,6 +22,8 @@ from ..analysis.scores import Score
 from ..analysis.typefaces import lettered
 from ..analysis.variables import find_variable
 from ..errors import visible
+from ..exchange.pdf_pages import STYLES, Drawing, Element, Rows, Words, write_pdf
+from ..exchange.simulation_tables import inputs_with_digests
 from ..hazard.design import KNOWN_TO, LEVELS_KJ, ON, DesignValues, Factor
 from ..hazard.screens import OUTCOMES, Screen
 from ..impact_models.registry import find_model
@@ -31,10 +33,8 @@ from ..remarks import to_plain
 from ..simulation.convergence import Quantile, fewest
 from ..simulation.parameter_draws import FRICTION_NAME
 from ..simulation.trees import LAW, NOT_KNOWN
-from ..workflow.design_figures import figures_of
-from ..workflow.design_sheet import ENERGY_LINES_DEG, DesignSheet, ModelDesign
-from .pdf_pages import STYLES, Drawing, Element, Rows, Words, write_pdf
-from .simulation_tables import inputs_with_digests
+from .design_figures import figures_of
+from .design_sheet import ENERGY_LINES_DEG, DesignSheet, ModelDesign
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

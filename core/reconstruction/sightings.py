@@ -7,8 +7,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..camera.model import SIGMA_PX
-from ..reconstruction.refinement.views import View
 from ..vectors import Array, Indices, Mask, Names
+from .refinement.views import View
 
 
 @dataclass(frozen=True, eq=False)

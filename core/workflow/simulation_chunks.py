@@ -9,6 +9,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from ..exchange.content_digest import content_digest
+from ..exchange.screens import write_screens
+from ..exchange.simulation_tables import append_screen_hits, drawn_names
 from ..hazard.run_tally import COLUMNS, RunTally
 from ..hazard.screen_tally import ScreenTally
 from ..hazard.screens import Screen
@@ -19,13 +22,10 @@ from ..simulation.ground import Ground
 from ..simulation.release import Releases
 from ..vectors import Array
 from ..versions import versions
-from ..workflow.ensembles import CHUNK, Pool, Tables, Work, run_ensemble
-from ..workflow.maps import Mapped, tallies_for
 from .chunk_store import ChunkStore
-from .content_digest import content_digest
-from .screens import write_screens
+from .ensembles import CHUNK, Pool, Tables, Work, run_ensemble
+from .maps import Mapped, tallies_for
 from .simulation_output import recorded_for, write_tables
-from .simulation_tables import append_screen_hits, drawn_names
 
 RUNS = "runs"
 HITS = "hits.csv"

@@ -10,6 +10,9 @@ import numpy as np
 
 from ..camera.quality import remarks_on_quality
 from ..errors import InputError, RockfallError
+from ..exchange.cameras import CameraFile, read_camera
+from ..exchange.project import Project
+from ..exchange.tables import read_picks
 from ..georeference import Z_UP, GlobalShift
 from ..reconstruction.block import Block
 from ..reconstruction.choices import FlightEnds
@@ -20,10 +23,7 @@ from ..remarks import Remark
 from ..terrain.misplaced import unit_hint
 from ..terrain.readers import read_tiles
 from ..terrain.surface import Surface
-from ..workflow.uprightness import turned_path, turned_picks
-from .cameras import CameraFile, read_camera
-from .project import Project
-from .tables import read_picks
+from .uprightness import turned_path, turned_picks
 
 FAR_CAMERA_M = 1000.0
 """A camera may be so far beside and above its terrain, and half as far again as this is large."""

@@ -7,13 +7,13 @@ from typing import Literal
 
 import numpy as np
 
-from ..reconstruction.block import Block
-from ..reconstruction.spin import Spin, measure_spin
-from ..reconstruction.spin_fits import fit_rates
-from ..reconstruction.spin_phases import directions, nearest, phases, tilted
 from ..remarks import Remark
 from ..vectors import Array, perpendicular
+from .block import Block
+from .spin import Spin, measure_spin
+from .spin_fits import fit_rates
 from .spin_marks import Marks
+from .spin_phases import directions, nearest, phases, tilted
 
 Verdict = Literal["measured", "counted", "ambiguous", "unknown"]
 """One rate fits; several do, and the one that was counted by eye is taken; several do; none is known."""

@@ -4,20 +4,20 @@
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
+from ..exchange.face_maps import write_face_maps
+from ..exchange.map_output import draw_maps, write_maps
+from ..exchange.screens import write_screens
+from ..exchange.simulated_motion import write_simulated_impacts, write_simulated_trajectories
+from ..exchange.simulation_entry import IMPACTS, RECORDS, TRAJECTORIES
+from ..exchange.simulation_tables import NO_SCREENS, summary, write_hits, write_runs, write_summary, write_tree_hits
+from ..exchange.trees import write_trees
 from ..hazard.cell_tally import CellTally
 from ..hazard.face_tally import FaceTally
 from ..hazard.screen_tally import ScreenTally
 from ..progress import Progress, silent
 from ..remarks import Remark
 from ..simulation.engine import Recorded, Simulation
-from ..workflow.maps import Mapped
-from .face_maps import write_face_maps
-from .map_output import draw_maps, write_maps
-from .screens import write_screens
-from .simulated_motion import write_simulated_impacts, write_simulated_trajectories
-from .simulation_entry import IMPACTS, RECORDS, TRAJECTORIES
-from .simulation_tables import NO_SCREENS, summary, write_hits, write_runs, write_summary, write_tree_hits
-from .trees import write_trees
+from .maps import Mapped
 
 MAPS, WITH_BARRIERS = "maps", "with_barriers"
 LARGE = 20_000

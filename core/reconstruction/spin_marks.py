@@ -11,8 +11,8 @@ from ..camera.model import SIGMA_PX
 from ..camera.path import rays_at
 from ..errors import InputError
 from ..georeference import GlobalShift
-from ..reconstruction.refinement.views import View
 from ..vectors import Array, Indices, Names
+from .refinement.views import View
 from .sightings import Sightings
 
 Axis = Literal["rolling", "sight"]

@@ -7,6 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, RockfallError
+from ..exchange.cameras import CameraFile
+from ..exchange.footage_tables import EventTable, Track, read_events, read_track
+from ..exchange.project import Project, VideoEntry
+from ..exchange.spin_tables import SPIN_MARKS_ADVICE, read_spin_marks
 from ..footage.advice import capture_rate_sentence
 from ..footage.clock import Clock
 from ..footage.file_facts import file_facts
@@ -16,16 +20,14 @@ from ..georeference import GlobalShift
 from ..progress import Progress, silent
 from ..reconstruction.picks import Picks
 from ..reconstruction.refinement.views import View
+from ..reconstruction.sightings import NO_EVENTS, NO_SIGHTINGS, SeenVideo
+from ..reconstruction.spin_marks import MarkedVideo
 from ..reconstruction.trajectory import Reconstruction
 from ..remarks import Remark
 from ..terrain.surface import Surface
 from ..vectors import Array, Indices
-from ..workflow.first_picks import first_picks
-from ..workflow.sightings import NO_EVENTS, NO_SIGHTINGS, SeenVideo
-from .cameras import CameraFile
-from .footage_tables import EventTable, Track, read_events, read_track
+from .first_picks import first_picks
 from .opening import block_of, read_project_camera, reconstruct_project
-from .project import Project, VideoEntry
 
 MARGIN = 0.1
 """A tracked block may leave the image by this part of its size."""
@@ -218,6 +220,38 @@ def measured_in(project: Project, surface: Surface | None) -> Reconstruction:
         return reconstruct_project(project, surface)
     made = reconstruct_project(project, surface, picks_from_footage(project, surface))
     return replace(made, remarks=(Remark(UNREFINED, about="picks"), *made.remarks))
+
+
+def read_marked_videos(
+    project: Project, surface: Surface | None, shift: GlobalShift | None = None
+) -> tuple[tuple[MarkedVideo, ...], tuple[str, ...]]:
+    """The videos of a project in which spins were marked, and sentences on what was done to their cameras.
+
+    Parameters
+    ----------
+    surface : the project's terrain, in whose frame the cameras are.
+    shift : of the local frame where there is no terrain (the picks').
+
+    Raises
+    ------
+    InputError : none has a camera and marks, or one of the files is bad.
+    """
+    found, notes = [], []
+    for entry in project.videos:
+        if entry.spin_marks is None:
+            continue
+        if entry.camera is None:
+            raise InputError(
+                f"Video {entry.name} has marks of spins, but no camera", advice='Align it, and name its camera = "…"'
+            )
+        camera, turned = read_project_camera(entry.camera, surface, shift)
+        notes += [f"{entry.name}: {note}" for note in turned]
+        marks = read_spin_marks(entry.spin_marks)
+        clock = clock_of(entry, marks.frame, marks.time_s)
+        found.append(MarkedVideo(View(entry.name, camera.path, clock, entry.row_time_s, camera.pose_covariance), marks))
+    if not found:
+        raise InputError("No video of the project has marks of spins", advice=SPIN_MARKS_ADVICE)
+    return tuple(found), tuple(notes)
 
 
 def clock_of(entry: VideoEntry, frame: Indices, time_s: Array) -> Clock:

@@ -49,7 +49,7 @@ def remarks_on(
     """Remarks on solved problems, what does not fit first; residual (m, 2) is NaN for pixels that were not used."""
     late = [remark for fit in fits for remark in _late_views(fit)]
     remarks = [remark for remark in late if remark.severity == "warning"]  # which is what the pixels then do not fit by
-    remarks += [remark for fit in fits for remark in _faults(fit)]
+    remarks += [remark for fit in fits for remark in _faults(fit, alone=len(fits) == 1)]
     remarks += [*_outliers(views, observations, residual, outlier), *on_assumptions(ground, views, fits)]
     seen = set(observations.trajectory.tolist())
     for name in dict.fromkeys(ground.picks.trajectory.tolist()):
@@ -81,17 +81,19 @@ def remarks_on(
     return (*remarks, *(remark for remark in late if remark.severity != "warning"))
 
 
-def _faults(fit: Fit) -> Iterator[Remark]:
+def _faults(fit: Fit, *, alone: bool) -> Iterator[Remark]:
     """What was found untrue of what was given; a wrong rate is said with gravity."""
     problem = fit.setup.problem
     for fault in fit.faults:
         if fault.kind == "ground":
             node = int(problem.grounded[int(fault.at)])
-            yield Remark(in_words(problem, fault, _pick(fit, node)), "warning", _trajectory(fit.setup, node))
+            yield Remark(
+                in_words(problem, fault, _pick(fit, node), alone=alone), "warning", _trajectory(fit.setup, node)
+            )
         elif fault.kind == "drag":
-            yield Remark(in_words(problem, fault, ""), "warning", "drag")
+            yield Remark(in_words(problem, fault, "", alone=alone), "warning", "drag")
         elif fault.kind != "rate":
-            yield Remark(in_words(problem, fault, ""), "warning", f"view {problem.views[fault.view].name}")
+            yield Remark(in_words(problem, fault, "", alone=alone), "warning", f"view {problem.views[fault.view].name}")
 
 
 def _joined(spans: Sequence[Array]) -> list[tuple[float, float]]:

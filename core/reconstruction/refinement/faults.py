@@ -27,6 +27,8 @@ MOST_INSTANTS = 150
 """Instants of a view between which a jump is sought at first, before those about the likeliest."""
 
 
+LIMITS = {"gap": (-10.0, 10.0), "ground": (-10.0, 10.0), "zoom": (-0.5, 0.5), "rate": (-0.9, 9.0), "drag": (0.0, 9.0)}
+"""Sizes between which a fault can be one."""
 RARE = {"gap": 100.0, "ground": 10.0, "zoom": 100.0, "rate": 100.0, "drag": 2.0}
 """One fit of so many has a fault of a kind: blocks dig into the ground, videos are cut less often."""
 NEARLY_ONE = 0.7
@@ -128,7 +130,7 @@ def applied(problem: Problem, state: Unknowns, fault: Fault, value: Array) -> tu
 def candidates(problem: Problem, state: Unknowns) -> Iterator[list[Fault]]:
     """The faults of each kind and view, of which one at most is there; their sizes are zero."""
     grounded = problem.grounded.size if problem.surface is not None else 0
-    seen = [int(i) for i in np.unique(problem.view)]
+    seen = [int(i) for i in np.unique(problem.view) if np.unique(problem.video_s[problem.view == i]).size > 2 * KNOTS]
     for view in seen:
         yield gaps(problem, view)
     if grounded > FEWEST_CONTACTS:
@@ -211,12 +213,19 @@ def columns_of(problem: Problem, state: Unknowns, jacobian: Array, faults: Seque
     return columns
 
 
-def in_words(problem: Problem, fault: Fault, contact: str) -> str:
+def can_be(fault: Fault) -> bool:
+    """Whether the size of a fault is one that the problem can be solved with."""
+    least, most = LIMITS[fault.kind]
+    return bool(((least < fault.value) & (fault.value < most)).all())
+
+
+def in_words(problem: Problem, fault: Fault, contact: str, *, alone: bool) -> str:
     """What was found and what to do, but for a wrong rate, which is said with gravity.
 
     Parameters
     ----------
     contact : a contact off the ground in words, as "impact at 2.1 s of trajectory a".
+    alone : all trajectories were fitted together, so that the clock of the view is corrected, too.
     """
     size, sigma = float(fault.value[0]), float(fault.sigma[0])
     if fault.kind == "ground":
@@ -244,7 +253,8 @@ def in_words(problem: Problem, fault: Fault, contact: str) -> str:
         return (
             f"View {name}: {what} after {fault.at:.3f} s of its video (frame {fault.at / frame:.0f}): all later ones "
             f"were taken {1e3 * abs(size):.0f} ± {1e3 * sigma:.0f} ms {'later' if size > 0 else 'earlier'} than the "
-            "file says. Times, speeds and the clock of this view are corrected for it: compare the pictures there."
+            f"file says. Times and speeds{' and the clock of this view' if alone else ''} are corrected for it: "
+            "compare the pictures there."
         )
     least, most = 100 * float(fault.value.min()), 100 * float(fault.value.max())
     seems = "may zoom" if fault.doubtful else "zooms"

@@ -19,8 +19,8 @@ from ...vectors import Array, Indices
 from ..choices import Loss
 from .accelerations import find_accelerations
 from .correlation import track_noise
-from .faults import Fault, applied, candidates, columns_of, gaps, prior_sigma, rarity
-from .problem import CLOCK_COLUMN, NODE, POSE_COLUMNS, Problem, Rows, Unknowns, ground_distances
+from .faults import Fault, applied, can_be, candidates, columns_of, gaps, prior_sigma, rarity
+from .problem import CLOCK_COLUMN, NODE, POSE_COLUMNS, Problem, Rows, Unknowns, evaluate, ground_distances
 from .search import Found, solve_with_noise
 from .solver import HUBER, REJECTED, Solution, objective, solve
 
@@ -253,8 +253,12 @@ def _without(found: Found, at: Found, trial: Trial, loss: Loss) -> tuple[Fault, 
     fault, step, state, problem = trial.fault, trial.step, before.state, base
     for _ in range(ROUNDS):
         fault = replace(fault, value=fault.value + step)
+        if not can_be(fault):
+            return None
         _, moved_state = applied(problem, state, fault, step)
         problem, _ = applied(base, before.state, fault, fault.value)
+        if not evaluate(problem, moved_state).valid:
+            return None
         solution = solve(problem, moved_state, loss)
         state = solution.state
         (again,) = _tried(_linear(problem, solution, found.noise), [fault])
@@ -270,7 +274,7 @@ def _without(found: Found, at: Found, trial: Trial, loss: Loss) -> tuple[Fault, 
                 continue
         if (np.abs(step) < SETTLED * sigma).all():
             break
-    if not solution.evaluation.valid or (fault.kind == "rate" and abs(float(fault.value[0])) < LEAST_RATE):
+    if fault.kind == "rate" and abs(float(fault.value[0])) < LEAST_RATE:
         return None
     variance = max(_scatter(solution), found.noise**-2.0) * _alike(problem, solution)
     gain = (objective(before, loss) - objective(solution, loss)) / variance

@@ -293,7 +293,7 @@ def _without(found: Found, at: Found, trial: Trial, loss: Loss) -> tuple[Fault, 
     against = (
         0.0 if rival is None or not rival.asked else rival.gain - trial.rare
     )  # accelerations are not taken for rare
-    if gain < max(ASKED_FOR, against * (BESIDE if fault.kind in ("zoom", "drag") else 1.0)):
+    if gain < max(ASKED_FOR, against * (BESIDE if fault.kind in ("zoom", "drag", "rate") else 1.0)):
         return None
     fault = replace(fault, doubtful=gain < against)
     unscaled = replace(problem, sigma_px=problem.sigma_px / found.noise, ground=problem.ground.scaled(1.0, 1.0))

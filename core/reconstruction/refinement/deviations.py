@@ -77,7 +77,7 @@ def with_covariance(
     poses = spread_of_poses(setup.problem, solution, independent)
     faults = np.zeros((len(poses), 0))
     if mended is not None:
-        faults = spread_of_faults(setup.problem, solution, independent, mended)
+        faults = spread_of_faults(setup.problem, solution, independent, mended.faults)
         faults *= np.sqrt(np.trace(covariance) / max(np.trace(independent), 1e-300))
     accelerations = find_accelerations(setup.problem, solution, setup.noise)
     if accelerations is not None:

@@ -369,27 +369,20 @@ def unseen_ground(
     return least, _moved_by(_linear(problem, solution, 1.0), covariance, [one.fault for one in unseen])
 
 
-def spread_of_faults(problem: Problem, solution: Solution, covariance: Array, mended: Mended) -> Array:
-    """(size, c) by how much the unknowns move with the numbers of faults that were taken out, and of those that may be
-    there unseen, each as much as it is likely: S with S Sᵀ.
+def spread_of_faults(problem: Problem, solution: Solution, covariance: Array, faults: Sequence[Fault]) -> Array:
+    """(size, c) by how much the unknowns move with the numbers of faults that were taken out: S with S Sᵀ.
 
     Parameters
     ----------
     covariance : (size, size) of the unknowns without.
     """
-    sized = [fault for fault in mended.faults if fault.kind in ("gap", "zoom")]
+    sized = [fault for fault in faults if fault.kind in ("gap", "zoom")]
     size = problem.columns.size
-    linear = _linear(problem, solution, 1.0)
-    parts = [np.zeros((size, 0))]
-    if mended.unseen:
-        odds = np.exp([one.evidence for one in mended.unseen])
-        away = np.array([float(one.step[0]) ** 2 + float(one.covariance[0, 0]) for one in mended.unseen])
-        moved = _moved_by(linear, covariance, [one.fault for one in mended.unseen])
-        parts.append(moved * np.sqrt(odds / (1 + odds.sum()) * away))
     if not sized:
-        return np.concatenate(parts, axis=1)
+        return np.zeros((size, 0))
+    linear = _linear(problem, solution, 1.0)
     columns = linear.columns(sized)
     across = np.asarray(linear.jacobian.T @ columns)
     known = np.concatenate([np.full(fault.value.size, prior_sigma(problem, fault) ** -2) for fault in sized])
     own = np.linalg.inv(columns.T @ columns - across.T @ linear.own @ across + np.diag(known))
-    return np.concatenate([*parts, -covariance @ across[:size] @ np.linalg.cholesky(own)], axis=1)
+    return np.asarray(-covariance @ across[:size] @ np.linalg.cholesky(own))

@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=not_negative,
         metavar="PART",
         help="standard deviation of how the cameras lie to the terrain beside their covariance, in parts of the "
-        "distance; 0: they are of one survey (default: as the project says, else 0.0014)",
+        "distance; 0: they are of one survey (default: as the project says, else 0.0012)",
     )
     parser.add_argument(
         "--sigma-terrain",

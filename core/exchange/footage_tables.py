@@ -218,7 +218,7 @@ def write_reliability(rows: Sequence[Statement], path: str | Path) -> None:
     for name in ("found", "sigma", "w", "critical", "noticed"):
         columns[name] = np.array([getattr(row, name) for row in rows])
     columns["beyond"] = ["1" if row.beyond else "0" for row in rows]
-    for name in ("speed_percent", "most_speed_percent"):
+    for name in ("speed_percent", "most_speed_percent", "intervals"):
         columns[name] = np.array([getattr(row, name) for row in rows])
     write_columns(path, columns)
 

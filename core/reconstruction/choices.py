@@ -18,6 +18,6 @@ SIGMA_AIM = 0.15
 """Standard deviation of the tracked spot about the block's centre, in parts of its diameter: its sunlit side draws the
 eye of people and of trackers."""
 
-SIGMA_DATUM = 0.0014
+SIGMA_DATUM = 0.0012
 """Standard deviation of how a camera lies to the terrain beside what its covariance says, in parts of the distance:
-0.2 m from 150 m away. With it the speeds of one view hold a camera that stands 0.3 m off, as heights of a survey do."""
+0.18 m from 150 m away. With it the speeds of one view hold where a camera stands 0.3 m off from there."""

@@ -90,11 +90,11 @@ GROUPS = (
     Group(
         "What the program is not told, or told wrongly", "Nothing in the input gives it away.",
         _cases(
-            _wrong("terrain wrong by 5 cm", TERRAIN, terrain_m=0.05),
-            _wrong("terrain wrong by 20 cm", TERRAIN, terrain_m=0.2),
-            _wrong("terrain wrong by 20 cm, two views", TERRAIN, 2, terrain_m=0.2),
-            _wrong("terrain 20 cm too high", TERRAIN, raised_m=0.2),
-            _wrong("camera 0.3 m too high", CAMERA, lifted_m=0.3),
+            _wrong("terrain wrong by 5 cm, not stated", TERRAIN, terrain_m=0.05),
+            _wrong("terrain wrong by 20 cm, not stated", TERRAIN, terrain_m=0.2),
+            _wrong("terrain wrong by 20 cm, not stated, two views", TERRAIN, 2, terrain_m=0.2),
+            _wrong("terrain 20 cm too high, not stated", TERRAIN, raised_m=0.2),
+            _wrong("camera 0.3 m too high, no covariance", CAMERA, lifted_m=0.3),
             _wrong("rolling shutter of 10 ms", SHUTTER, readout_s=0.01),
             _wrong("rolling shutter of 20 ms", SHUTTER, readout_s=0.02),
             _wrong("rolling shutter of 30 ms", SHUTTER, readout_s=0.03),

@@ -117,6 +117,8 @@ def test_a_proposal_changes_nothing_until_it_is_applied(tracked, part, truth, nu
     assert len(found.changes) == 5
     assert [cells[0].split()[0] for cells in found.what_if[:3]] == ["Deviation", "Camera", "Terrain"]
     assert all(cells[1].endswith(" %") for cells in found.what_if)
+    assert [cells[0].split()[0] for cells in found.unnoticed[:3]] == ["Camera", "Terrain", "Terrain"]
+    assert all(cells[1].endswith(" m") and cells[2].endswith(" %") for cells in found.unnoticed[:3])
     assert not found.stale
     assert [list(obj["rockfall_position_m"]) for obj in picks_of(tracked)] == before
     place, colour, joined = proposal.path(tracked)

@@ -23,7 +23,7 @@ from .what_if import flights_at_impacts
 SIGNIFICANCE, POWER = 0.001, 0.8
 """Chance that a test of what is right rejects it, and that one notices an error of the size that is said."""
 MOST_PERCENT = 20.0
-"""An error that would change a speed by more is not looked at: it would show otherwise."""
+"""What an error does to a speed is told by derivatives: not beyond this."""
 CAMERA, TERRAIN, CONTACT, TIME, PLACE = "camera of", "terrain", "contact", "time", "place"
 OPPOSITE = {
     "higher": "lower",
@@ -86,9 +86,14 @@ class Statement:
     @property
     def cells(self) -> tuple[str, str, str, str]:
         """The error, the size below which it is not noticed, and what it changes: as text for people."""
-        size = f"{1e3 * self.noticed:.2g} ms" if self.unit == "s" else f"{self.noticed:.2g} m"
+        size = f"{_short(1e3 * self.noticed)} ms" if self.unit == "s" else f"{_short(self.noticed)} m"
         sign = "> " if self.beyond else ""
-        return self.error, sign + size, f"{self.speed_percent:.2g} %", f"{self.most_speed_percent:.2g} %"
+        return self.error, sign + size, f"{_short(self.speed_percent)} %", f"{_short(self.most_speed_percent)} %"
+
+
+def _short(value: float) -> str:
+    """To two digits, without an exponent."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +141,7 @@ def on_statements(rows: Sequence[Statement]) -> Iterator[Remark]:
             f"tell. {CHECK[row.about.split()[0]]}"
         )
         yield Remark(text, "warning", row.about)
-    unseen = [row for row in rows if row.about not in (TIME, PLACE) and row.intervals > 1]
+    unseen = [row for row in rows if row.about not in (CONTACT, TIME, PLACE) and row.intervals > 1]
     if unseen:
         row = max(unseen, key=lambda one: one.most_speed_percent)
         error = row.error[0].lower() + row.error[1:]

@@ -4,8 +4,8 @@
 Where the pixels alone place the contacts well (two views and more), their distances from the terrain show how far it
 is off. Two factors are sought, on what differs from contact to contact and on what the terrain's accuracy does
 (variance components; Searle et al. 1992, Variance Components, ch. 6): of each the mean of its logarithm, with the
-likelihood of the distances that the pixels alone would give and a prior about one with heavy tails: what is stated is
-mostly about right, and where it is wrong it may be by any factor. Where nothing tells of them both are one.
+likelihood of the distances that the pixels alone would give and a wide prior about one, where they stay if nothing
+tells of them.
 """
 
 import numpy as np
@@ -15,9 +15,9 @@ from .held_poses import spread_of_poses
 from .problem import Problem, ground_rows
 from .solver import Solution
 
-SPREAD, FREEDOM = np.log(2.0), 3.0
-"""Of the prior of a factor's logarithm, Student's distribution: its scale and its degrees of freedom."""
-GRID = np.exp(np.linspace(-np.log(32.0), np.log(32.0), 15))
+SPREAD = np.log(2.0)
+"""Standard deviation of the prior of a factor's logarithm."""
+GRID = np.exp(np.linspace(-np.log(16.0), np.log(16.0), 15))
 LEAST_SHARE = 1e-9
 """Of what the pixels tell about a distance beside the terrain itself; less than that is none."""
 
@@ -50,7 +50,7 @@ def terrain_scales(problem: Problem, solution: Solution) -> tuple[float, float]:
         for j, smooth in enumerate(GRID):
             factor = np.linalg.cholesky(pixels + own**2 * contact + smooth**2 * terrain + LEAST_SHARE * np.eye(count))
             white = np.linalg.solve(factor, innovation)
-            prior = (FREEDOM + 1) * np.log1p(np.log([own, smooth]) ** 2 / (FREEDOM * SPREAD**2)).sum()
+            prior = (np.log(own) ** 2 + np.log(smooth) ** 2) / SPREAD**2
             likelihood[i, j] = -np.log(np.diag(factor)).sum() - 0.5 * (white @ white + prior)
     weight = np.exp(likelihood - likelihood.max())
     weight /= weight.sum()

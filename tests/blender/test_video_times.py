@@ -63,6 +63,29 @@ def test_events_synchronise(part: Part, fit_drift: bool) -> None:
     assert not [remark for remark in said if remark.about == "clock"]
 
 
+def test_frames_that_are_missing_stay_so(part: Part) -> None:
+    """A gap that a refinement found: the clock jumps there, also when it is synchronised or its rate is told."""
+    videos, clocks = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.clocks")
+    times = part("rockfall_addon.scene.video_times")
+    reference, other = (add(part, "slower.mp4") for _ in range(2))
+    shown = videos.times_of(other)
+    gap = (float(shown[60]), 0.2)
+    clocks.set_clock(other, part("core.footage.clock").Clock(gaps=(gap,)))
+    assert clocks.clock_of(other).to_common(shown[[60, 61]]) == pytest.approx(shown[[60, 61]] + [0, 0.2])
+    event = float(videos.times_of(reference)[100])
+    times.go_to(scene(), clocks.frame_at(scene(), event))
+    times.mark_event(scene(), reference, 1)
+    times.go_to(scene(), clocks.scene_frame_of(scene(), other, 90))
+    times.mark_event(scene(), other, 1)
+    times.synchronise_cameras(scene(), fit_drift=False)
+    found = clocks.clock_of(other)
+    assert found.gaps == (gap,)
+    assert found.to_common(float(shown[90])) == pytest.approx(event)
+    assert found.to_common(float(shown[30])) == pytest.approx(event - 0.2 - float(shown[90] - shown[30]))
+    clocks.set_capture_rate(other, 60.0)
+    assert clocks.clock_of(other).gaps == (gap,)
+
+
 def test_next_video_begins_with_the_others(part: Part) -> None:
     clocks, videos = part("rockfall_addon.scene.footage.clocks"), part("rockfall_addon.scene.footage.videos")
     camera = add(part, "constant.mp4")

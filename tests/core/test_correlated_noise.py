@@ -12,7 +12,7 @@ from rockfall.core.reconstruction.refinement.refine import PixelObservations, Vi
 from rockfall.core.terrain.surface import Surface
 from scipy.signal import lfilter
 
-BLOCK = Block(0.05, 0.05, 0.05)
+BLOCK = Block(0.05, 0.05, 0.05, density=1e5)  # so heavy that the air does nothing to it
 PLANE = Surface(
     np.array([[-40.0, -40, 0], [40, -40, 0], [40, 40, 0], [-40, 40, 0]]),
     np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32),

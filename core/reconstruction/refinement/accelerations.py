@@ -4,7 +4,8 @@
 A block that spins is lifted (Magnus), a flat one sails, a light one brakes: over a flight of a second much like a
 constant acceleration beside that of gravity. Whether the pixels ask for one in each flight, all of the same size in
 the mean, is tested by the ratio of likelihoods with and without; its standard deviation is the likeliest one. The fit
-keeps its flights, and its covariance is that of its errors with such accelerations.
+keeps its flights, and its covariance is that of its errors with such accelerations; where the pixels do not ask for
+them, with those that could pass unseen.
 """
 
 from dataclasses import dataclass, replace
@@ -21,6 +22,12 @@ SIZES_MPS2 = np.geomspace(0.03, 30.0, 31)
 """Standard deviations of the acceleration that are tried [m/s²]."""
 ASKED_FOR = 4.0
 """Logarithm of the ratio of likelihoods from which the accelerations are there."""
+LIFT = 0.35
+"""Coefficient of lift of a ball whose surface turns about as fast as it flies, as one that rolls (Nathan 2008)."""
+UNSEEN_PARTS = np.array([0.25, 0.5, 1.0])
+"""Of what the air may do to a block: accelerations that the pixels may not tell from none."""
+FREEDOM, REWEIGHTED = 2.0, 10
+"""Degrees of freedom of Student's distribution of the flights' accelerations, and rounds of reweighting."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,21 +39,25 @@ class Accelerations:
     problem : with the columns of the accelerations, after those of the unknowns.
     mean : (k, 3) the likeliest ones [m/s²].
     sigma_mps2 : standard deviation of one of their components.
-    covariance : (size + 3k, size + 3k) of the errors of the unknowns, and of the accelerations about none.
+    spread : (size + 3k, size + 3k) covariance of what they do to the unknowns, and of themselves about none.
+    own : (size, size) covariance of the unknowns for given accelerations.
     tracks : noise of the tracks with the accelerations.
     gain : logarithm of the ratio of likelihoods with and without.
+    asked : the pixels ask for them; where not, `spread` is of what could pass unseen.
     """
 
     problem: Problem
     mean: Array
     sigma_mps2: float
-    covariance: Array
+    spread: Array
+    own: Array
     tracks: tuple[TrackNoise, ...]
     gain: float
+    asked: bool
 
 
 def find_accelerations(problem: Problem, solution: Solution, noise: float) -> Accelerations | None:
-    """The accelerations that the pixels ask for; None where they do not.
+    """The accelerations that the pixels ask for, or that they do not rule out; None without flights.
 
     Parameters
     ----------
@@ -84,23 +95,75 @@ def find_accelerations(problem: Problem, solution: Solution, noise: float) -> Ac
     variance *= max(1.0, float(np.mean(alike))) if alike else 1.0
 
     told, slope = told / variance, axes.T @ slope / variance
-    gain = [
-        float((0.5 * size_2 * slope**2 / (1 + size_2 * told) - 0.5 * np.log1p(size_2 * told)).sum())
-        for size_2 in SIZES_MPS2**2
-    ]
+    gain = _gains(told, slope, SIZES_MPS2)
     best = int(np.argmax(gain))
-    if gain[best] < ASKED_FOR:
-        return None
-    likely = SIZES_MPS2[best] ** 2
-    mean = -axes @ (likely * slope / (1 + likely * told))
-    spread = (axes * (likely / (1 + likely * told))) @ axes.T + np.outer(mean, mean)
+    asked = bool(gain[best] >= ASKED_FOR)
+    if asked:
+        mean, spread = _in_each_flight(axes @ (told[:, None] * axes.T), axes @ slope, float(SIZES_MPS2[best]))
+    else:
+        mean, spread = np.zeros(told.size), _too_small_to_tell(axes, told, slope, _in_air(problem, solution))
     through = np.concatenate([drawn, np.eye(told.size)])
-    covariance = through @ spread @ through.T
-    covariance[:size, :size] += variance * own
     found = np.zeros((len(problem.first), 3))
     found[flying] = mean.reshape(-1, 3)
     kept = tuple(replace(track, columns=track.columns[track.columns < size]) for track in tracks)
-    return Accelerations(wide, found, float(SIZES_MPS2[best]), covariance, kept, gain[best])
+    return Accelerations(
+        wide,
+        found,
+        float(SIZES_MPS2[best]),
+        through @ spread @ through.T,
+        variance * own,
+        kept,
+        float(gain[best]),
+        asked,
+    )
+
+
+def _in_each_flight(told: Array, slope: Array, size: float) -> tuple[Array, Array]:
+    """The accelerations (3k,) that are there, and the covariance of their errors about none.
+
+    One size holds for all flights in the mean, but single ones may have much more (drag of the fastest, another spin):
+    their prior is Student's distribution, solved by reweighting each flight.
+
+    Parameters
+    ----------
+    told, slope : (3k, 3k), (3k,) information and gradient of half the squares.
+    """
+    flights, weight = slope.size // 3, np.ones(slope.size // 3)
+    for _ in range(REWEIGHTED):
+        covariance = np.linalg.inv(told + np.diag(np.repeat(weight, 3)) / size**2)
+        mean = -covariance @ slope
+        square = (mean**2 + np.diag(covariance)).reshape(flights, 3).sum(axis=1) / size**2
+        weight = (FREEDOM + 3) / (FREEDOM + square)
+    return mean, covariance + np.outer(mean, mean)
+
+
+def _gains(told: Array, slope: Array, sizes_mps2: Array) -> Array:
+    """(s,) logarithm of the ratio of likelihoods with accelerations of s sizes and without."""
+    size_2 = sizes_mps2[:, None] ** 2
+    return np.asarray((0.5 * size_2 * slope**2 / (1 + size_2 * told) - 0.5 * np.log1p(size_2 * told)).sum(axis=1))
+
+
+def _in_air(problem: Problem, solution: Solution) -> float:
+    """What the air does to blocks that spin as if they rolled, in the mean of the flights [m/s²]."""
+    pace = solution.evaluation.motion.start_velocity[~problem.contact]
+    lift = LIFT * problem.reference_drag[~problem.contact] * (pace**2).sum(axis=1)
+    return float(np.sqrt((lift**2).mean()))
+
+
+def _too_small_to_tell(axes: Array, told: Array, slope: Array, greatest_mps2: float) -> Array:
+    """(3k, 3k) covariance of accelerations about none that the pixels do not ask for, but do not rule out either.
+
+    There are none, or some of a part of the greatest, each as much as it is likely.
+    """
+    sizes = greatest_mps2 * UNSEEN_PARTS
+    weight = np.exp(np.minimum(_gains(told, slope, sizes), ASKED_FOR)) / sizes.size
+    weight /= 1 + weight.sum()
+    spread = np.zeros_like(axes)
+    for part, size_2 in zip(weight, sizes**2, strict=True):
+        narrow = size_2 / (1 + size_2 * told)
+        mean = axes @ (narrow * slope)
+        spread += part * ((axes * narrow) @ axes.T + np.outer(mean, mean))
+    return spread
 
 
 def _with_accelerations(problem: Problem, solution: Solution) -> Rows:

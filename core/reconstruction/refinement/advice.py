@@ -12,8 +12,9 @@ from ...vectors import Array, Mask, dot, norm, unit
 from ..triangulation import GRAZING_DEG
 from .assumptions import on_assumptions
 from .contact_pixels import while_landed
-from .deviations import Fit
+from .deviations import Fit, velocity_rows
 from .faults import in_words
+from .mending import unseen_ground
 from .problem import CLOCK_COLUMN, NODE, solve_segments
 from .setup import Ground, Setup
 from .solver import normal_equations
@@ -31,6 +32,8 @@ MANY = 0.1
 IN_A_ROW = 5
 """Outliers one after the other: the motion between two picks is another one, as when an impact is missing."""
 MOST_TIMES = 3
+GONE_M = 0.3
+"""What may be gone of the ground at a contact since it was scanned, for which it is said where it passes unseen."""
 UNLIKELY = 0.05
 """Chance below which another solution is not spoken of."""
 
@@ -46,7 +49,7 @@ def remarks_on(
     """Remarks on solved problems, what does not fit first; residual (m, 2) is NaN for pixels that were not used."""
     late = [remark for fit in fits for remark in _late_views(fit)]
     remarks = [remark for remark in late if remark.severity == "warning"]  # which is what the pixels then do not fit by
-    remarks += [remark for fit in fits for remark in _faults(fit)]
+    remarks += [remark for fit in fits for remark in _faults(fit, alone=len(fits) == 1)]
     remarks += [*_outliers(views, observations, residual, outlier), *on_assumptions(ground, views, fits)]
     seen = set(observations.trajectory.tolist())
     for name in dict.fromkeys(ground.picks.trajectory.tolist()):
@@ -73,19 +76,24 @@ def remarks_on(
             *_open_ends(fit),
             *_off_centre(fit),
             *_grazing(fit),
+            *_unseen_ground(fit),
         ]
     return (*remarks, *(remark for remark in late if remark.severity != "warning"))
 
 
-def _faults(fit: Fit) -> Iterator[Remark]:
+def _faults(fit: Fit, *, alone: bool) -> Iterator[Remark]:
     """What was found untrue of what was given; a wrong rate is said with gravity."""
     problem = fit.setup.problem
     for fault in fit.faults:
         if fault.kind == "ground":
             node = int(problem.grounded[int(fault.at)])
-            yield Remark(in_words(problem, fault, _pick(fit, node)), "warning", _trajectory(fit.setup, node))
+            yield Remark(
+                in_words(problem, fault, _pick(fit, node), alone=alone), "warning", _trajectory(fit.setup, node)
+            )
+        elif fault.kind == "drag":
+            yield Remark(in_words(problem, fault, "", alone=alone), "warning", "drag")
         elif fault.kind != "rate":
-            yield Remark(in_words(problem, fault, ""), "warning", f"view {problem.views[fault.view].name}")
+            yield Remark(in_words(problem, fault, "", alone=alone), "warning", f"view {problem.views[fault.view].name}")
 
 
 def _joined(spans: Sequence[Array]) -> list[tuple[float, float]]:
@@ -248,6 +256,28 @@ def _grazing(fit: Fit) -> Iterator[Remark]:
             "place rests on the flights beside it."
         )
         yield Remark(text, "note", _trajectory(setup, nodes[i]))
+
+
+def _unseen_ground(fit: Fit) -> Iterator[Remark]:
+    """That a change of the ground at one contact could not be noticed, where it could not."""
+    unseen = () if fit.mended is None else fit.mended.unseen
+    if not unseen:
+        return
+    problem, motion = fit.setup.problem, fit.solution.evaluation.motion
+    least, moved = unseen_ground(problem, fit.solution, fit.independent, unseen)
+    if float(np.median(least)) < GONE_M:
+        return
+    flying, change = np.flatnonzero(~problem.contact), list[Array]()
+    for at_end, velocity in ((False, motion.start_velocity[flying]), (True, motion.end_velocity[flying])):
+        slope = velocity_rows(problem, motion, flying, at_end=at_end)[:, :, : len(moved)] @ moved
+        change.append(np.einsum("ki,kic->kc", unit(velocity), slope) / norm(velocity)[:, None])
+    most = GONE_M * np.abs(np.concatenate(change)).max(axis=0)
+    text = (
+        f"{_who(fit.setup)}: these views do not test the ground at a single contact: what it is off by passes unseen "
+        f"below about {float(np.median(least)):.1f} m, and {GONE_M:g} m would change a speed beside it by "
+        f"{100 * float(np.median(most)):.1f} %. A second side does."
+    )
+    yield Remark(text, "note", fit.setup.names[0] if len(fit.setup.names) == 1 else "")
 
 
 def _late_views(fit: Fit) -> Iterator[Remark]:

@@ -60,7 +60,7 @@ def _on_gravity(fits: Sequence[Fit]) -> Iterator[Remark]:
 def _on_accelerations(fits: Sequence[Fit]) -> Iterator[Remark]:
     """Flights that are not those of gravity and drag."""
     found = [(fit, fit.accelerations) for fit in fits if fit.accelerations is not None]
-    if not found or any(fault.kind == "rate" for fit, _ in found for fault in fit.faults):
+    if not found or any(fault.kind in ("rate", "drag") for fit, _ in found for fault in fit.faults):
         return
     size = float(np.median([one.sigma_mps2 for _, one in found]))
     names = [name for fit, _ in found for name in fit.setup.names]

@@ -81,12 +81,15 @@ def with_covariance(
         faults *= np.sqrt(np.trace(covariance) / max(np.trace(independent), 1e-300))
     accelerations = find_accelerations(setup.problem, solution, setup.noise)
     if accelerations is not None:
-        covariance, tracks = accelerations.covariance, accelerations.tracks
+        without, covariance = covariance, accelerations.spread
+        asked, tracks = accelerations.asked, accelerations.tracks if accelerations.asked else tracks
+        covariance[: len(poses), : len(poses)] += accelerations.own if asked else without
         setup = replace(setup, problem=accelerations.problem)
+        accelerations = accelerations if asked else None
     covariance[: len(poses), : len(poses)] += poses @ poses.T + faults @ faults.T
     for other in () if mended is None else mended.otherwise:
-        away = np.column_stack([other.centre - solution.state.centre, other.time_s - solution.state.time_s]).ravel()
-        covariance[: away.size, : away.size] += np.outer(away, away)
+        away = _away(setup.problem, solution, other, len(covariance))
+        covariance += np.outer(away, away)
     odds = np.array([np.exp(-rival.worse / scale**2) for rival in rivals])
     of = np.array([rival.trajectory for rival in rivals])
     chance = np.array([one / (1 + odds[of == name].sum()) for one, name in zip(odds, of, strict=True)])
@@ -99,6 +102,20 @@ def with_covariance(
     return Fit(
         setup, solution, covariance, scale**2 * independent, scale, tracks, tuple(rivals), chance, accelerations, mended
     )
+
+
+def _away(problem: Problem, solution: Solution, other: Solution, size: int) -> Array:
+    """(size,) what another solution of the same nodes has otherwise; what brakes its flights, as accelerations."""
+    away, state = np.zeros(size + 1), solution.state
+    nodes = np.column_stack([other.state.centre - state.centre, other.state.time_s - state.time_s])
+    away[: nodes.size] = nodes.ravel()
+    mean, here = (
+        (one.evaluation.motion.end_velocity - one.evaluation.motion.start_velocity)
+        / one.evaluation.motion.duration_s[:, None]
+        for one in (other, solution)
+    )
+    away[problem.columns.push] = mean - here
+    return away[:-1]
 
 
 def velocity_rows(problem: Problem, motion: NodeMotion, segment: Indices, *, at_end: bool) -> Array:

@@ -13,20 +13,23 @@ from typing import Literal
 import numpy as np
 
 from ...vectors import Array
-from .problem import Problem, Unknowns, common_times
+from .problem import CLOCK_COLUMN, DRAG_COLUMN, Problem, Unknowns, common_times, evaluate
 
-Kind = Literal["gap", "ground", "zoom", "rate"]
+Kind = Literal["gap", "ground", "zoom", "rate", "drag"]
 
-SIGMA_GAP_FRAMES, SIGMA_GONE_M, SIGMA_ZOOM, SIGMA_RATE = 4.0, 0.4, 0.04, 0.2
+SIGMA_GAP_FRAMES, SIGMA_GONE_M, SIGMA_ZOOM, SIGMA_RATE, SIGMA_DRAG = 4.0, 0.4, 0.04, 0.2, 0.6
 """Standard deviations of a jump of a clock in frames, of what is gone of the ground [m], of a focal length at each knot
-and of a factor on times, as parts."""
+and of a factor on times, as parts, and of a coefficient of drag."""
+LEAST_DRAG = 1e-6
 KNOTS = 5
 """Of a spline of the focal length over the time of a track."""
 MOST_INSTANTS = 150
 """Instants of a view between which a jump is sought at first, before those about the likeliest."""
 
 
-RARE = {"gap": 100.0, "ground": 10.0, "zoom": 100.0, "rate": 100.0}
+LIMITS = {"gap": (-10.0, 10.0), "ground": (-10.0, 10.0), "zoom": (-0.5, 0.5), "rate": (-0.9, 9.0), "drag": (0.0, 9.0)}
+"""Sizes between which a fault can be one."""
+RARE = {"gap": 100.0, "ground": 10.0, "zoom": 100.0, "rate": 100.0, "drag": 2.0}
 """One fit of so many has a fault of a kind: blocks dig into the ground, videos are cut less often."""
 NEARLY_ONE = 0.7
 """Frames that are missing, from which they are counted."""
@@ -41,12 +44,12 @@ class Fault:
     Attributes
     ----------
     kind : gap: the clock of a view jumps after a frame; ground: a contact lies off the terrain; zoom: the focal length
-        of a view changes; rate: all times are too short by a factor.
+        of a view changes; rate: all times are too short by a factor; drag: air brakes the blocks.
     view : its index, −1 for all.
     at : of a gap the video time of the last frame before it [s]; of the ground the contact, among those on it.
     picks : of a gap: the picks were marked in this view, and have its times.
     value : (p,) its size: common seconds by which all later frames are late; metres of the ground that are gone; parts
-        by which the focal length is larger at the knots; part by which times are longer.
+        by which the focal length is larger at the knots; part by which times are longer; coefficient of drag.
     knots_s : (p,) video times of the knots of a focal length.
     sigma : (p,) standard deviation of the size.
     doubtful : accelerations of the flights explain more of it: it was not taken out.
@@ -106,6 +109,8 @@ def applied(problem: Problem, state: Unknowns, fault: Fault, value: Array) -> tu
         larger = _spline(problem.video_s, fault.knots_s) @ value
         pixel = problem.pixel - _from_middle(problem, fault.view) * (larger / (1 + larger))[:, None]
         return replace(problem, pixel=pixel), state
+    if fault.kind == "drag":
+        return problem, replace(state, coefficient=state.coefficient + size)
     middle = float(state.time_s.mean())
     clocks = [
         replace(
@@ -125,13 +130,15 @@ def applied(problem: Problem, state: Unknowns, fault: Fault, value: Array) -> tu
 def candidates(problem: Problem, state: Unknowns) -> Iterator[list[Fault]]:
     """The faults of each kind and view, of which one at most is there; their sizes are zero."""
     grounded = problem.grounded.size if problem.surface is not None else 0
-    seen = [int(i) for i in np.unique(problem.view)]
+    seen = [int(i) for i in np.unique(problem.view) if np.unique(problem.video_s[problem.view == i]).size > 2 * KNOTS]
     for view in seen:
         yield gaps(problem, view)
     if grounded > FEWEST_CONTACTS:
         yield [_fault("ground", at=float(i)) for i in range(grounded)]
     if problem.columns.law[1] < 0:
         yield [_fault("rate")]
+    if problem.columns.law[0] < 0 and state.coefficient == 0:
+        yield [_fault("drag")]
     for view in seen:
         times = problem.video_s[problem.view == view]
         yield [_fault("zoom", view, knots_s=np.linspace(times.min(), times.max(), KNOTS))]
@@ -159,7 +166,7 @@ def prior_sigma(problem: Problem, fault: Fault) -> float:
     """Prior standard deviation of each number of a fault."""
     if fault.kind == "gap":
         return SIGMA_GAP_FRAMES * frame_s(problem, fault.view) * problem.views[fault.view].clock.speed
-    return {"ground": SIGMA_GONE_M, "zoom": SIGMA_ZOOM, "rate": SIGMA_RATE}[fault.kind]
+    return {"ground": SIGMA_GONE_M, "zoom": SIGMA_ZOOM, "rate": SIGMA_RATE, "drag": SIGMA_DRAG}[fault.kind]
 
 
 def rarity(fault: Fault) -> float:
@@ -167,15 +174,16 @@ def rarity(fault: Fault) -> float:
     return float(np.log(RARE[fault.kind]))
 
 
-def columns_of(problem: Problem, state: Unknowns, by_time: Array, faults: Sequence[Fault]) -> Array:
+def columns_of(problem: Problem, state: Unknowns, jacobian: Array, faults: Sequence[Fault]) -> Array:
     """(rows, c) derivatives of the residuals by the numbers of some faults, about the sizes that the problem has.
 
     Parameters
     ----------
-    by_time : (m, 2) derivatives of the pixels' residuals by time.
+    jacobian : (m, 2, 21) of the pixels' residuals.
 
     The rows are those of the pixels (2m), of the nodes' times (n), and of the ground (g).
     """
+    by_time = jacobian[:, :, CLOCK_COLUMN]
     m, n, g = len(by_time), state.time_s.size, problem.grounded.size if problem.surface is not None else 0
     weight = np.where(np.isfinite(problem.sigma_time_s), -1 / problem.sigma_time_s, 0.0)
     columns = np.zeros((2 * m + n + g, sum(fault.value.size for fault in faults)))
@@ -190,6 +198,11 @@ def columns_of(problem: Problem, state: Unknowns, by_time: Array, faults: Sequen
             own[: 2 * m, 0] = (by_time * late[:, None]).ravel()
             if fault.picks:
                 own[2 * m : 2 * m + n, 0] = weight * _later_nodes(problem, state, fault)
+        elif fault.kind == "drag":
+            slightly = replace(
+                state, coefficient=max(state.coefficient, LEAST_DRAG)
+            )  # without it they are not computed
+            own[: 2 * m, 0] = evaluate(problem, slightly).pixels.jacobian[:, :, DRAG_COLUMN].ravel()
         elif fault.kind == "rate":
             middle = float(state.time_s.mean())
             own[: 2 * m, 0] = (by_time * (common_times(problem, state) - middle)[:, None]).ravel()
@@ -200,12 +213,19 @@ def columns_of(problem: Problem, state: Unknowns, by_time: Array, faults: Sequen
     return columns
 
 
-def in_words(problem: Problem, fault: Fault, contact: str) -> str:
-    """What was found and what to do, but for a wrong rate.
+def can_be(fault: Fault) -> bool:
+    """Whether the size of a fault is one that the problem can be solved with."""
+    least, most = LIMITS[fault.kind]
+    return bool(((least < fault.value) & (fault.value < most)).all())
+
+
+def in_words(problem: Problem, fault: Fault, contact: str, *, alone: bool) -> str:
+    """What was found and what to do, but for a wrong rate, which is said with gravity.
 
     Parameters
     ----------
     contact : a contact off the ground in words, as "impact at 2.1 s of trajectory a".
+    alone : all trajectories were fitted together, so that the clock of the view is corrected, too.
     """
     size, sigma = float(fault.value[0]), float(fault.sigma[0])
     if fault.kind == "ground":
@@ -213,6 +233,11 @@ def in_words(problem: Problem, fault: Fault, contact: str) -> str:
             f"The {contact} lies {abs(size):.2f} ± {sigma:.2f} m {'lower' if size > 0 else 'higher'} than the terrain, "
             "which fits elsewhere: was the ground there another one when it was scanned? The terrain does not hold "
             "this contact; its normal there is not to be believed."
+        )
+    if fault.kind == "drag":
+        return (
+            f"The flights brake as in air, with a coefficient of drag of {size:.2g} ± {sigma:.1g}, which was left out: "
+            "switch air drag on, and refine again. The deviations contain it."
         )
     name = problem.views[fault.view].name
     if fault.kind == "gap":
@@ -228,7 +253,8 @@ def in_words(problem: Problem, fault: Fault, contact: str) -> str:
         return (
             f"View {name}: {what} after {fault.at:.3f} s of its video (frame {fault.at / frame:.0f}): all later ones "
             f"were taken {1e3 * abs(size):.0f} ± {1e3 * sigma:.0f} ms {'later' if size > 0 else 'earlier'} than the "
-            "file says. Times, speeds and the clock of this view are corrected for it: compare the pictures there."
+            f"file says. Times and speeds{' and the clock of this view' if alone else ''} are corrected for it: "
+            "compare the pictures there."
         )
     least, most = 100 * float(fault.value.min()), 100 * float(fault.value.max())
     seems = "may zoom" if fault.doubtful else "zooms"

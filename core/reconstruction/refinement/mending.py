@@ -19,8 +19,8 @@ from ...vectors import Array, Indices
 from ..choices import Loss
 from .accelerations import find_accelerations
 from .correlation import track_noise
-from .faults import Fault, applied, candidates, columns_of, gaps, prior_sigma, rarity
-from .problem import CLOCK_COLUMN, NODE, POSE_COLUMNS, Problem, Rows, Unknowns, ground_distances
+from .faults import Fault, applied, can_be, candidates, columns_of, gaps, prior_sigma, rarity
+from .problem import CLOCK_COLUMN, NODE, POSE_COLUMNS, Problem, Rows, Unknowns, evaluate, ground_distances
 from .search import Found, solve_with_noise
 from .solver import HUBER, REJECTED, Solution, objective, solve
 
@@ -35,8 +35,21 @@ BESIDE = 0.5
 """What explains so much of what another cause does, by the logarithms of their likelihoods, is not ruled out by it."""
 AS_STATED = 1.5
 """One contact alone is off the ground where the terrain is by no more than so many times what was stated elsewhere."""
+POWER = 0.84
+"""So many standard deviations beyond the threshold an error is found four times in five."""
 LEAST_RATE = 0.025
 """A capture rate that is wrong is so by more than this part."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A fault with the logarithm of its ratio of likelihoods, how rare it is, and the step of its size."""
+
+    fault: Fault
+    evidence: float
+    rare: float
+    step: Array
+    covariance: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +60,15 @@ class Mended:
     ----------
     found : the fit.
     faults : in the order in which they were found.
-    otherwise : where the unknowns would be with another capture rate, which stays in the problem since it is a
-        person's to set; and with or without a fault that accelerations of the flights explain about as well.
+    unseen : contacts that may be off the ground although the pixels do not ask for it.
+    otherwise : the solutions with another capture rate or drag, which stay in the problem since they are
+        a person's to set; and with or without a fault that accelerations of the flights explain about as well.
     """
 
     found: Found
     faults: tuple[Fault, ...] = ()
-    otherwise: tuple[Unknowns, ...] = ()
+    otherwise: tuple[Solution, ...] = ()
+    unseen: tuple[Trial, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +79,7 @@ class _Linear:
     ----------
     residual, jacobian : (rows,), (rows, q) sparse; of the pixels, the times of all nodes, the ground, and the rest.
     own : (q, q) the inverse of its normal equations.
-    root : (m,) of the pixels' weights; by_time (m, 2) their derivatives by time, without.
+    root : (m,) of the pixels' weights.
     spare : number of residuals of pixels beyond the unknowns.
     floor : least variance of the pixels, as they were stated.
     """
@@ -75,13 +90,12 @@ class _Linear:
     jacobian: "csr_array"
     own: Array
     root: Array
-    by_time: Array
     spare: float
     floor: float
 
     def columns(self, faults: Sequence[Fault]) -> Array:
         """(rows, c) of faults."""
-        columns = columns_of(self.problem, self.solution.state, self.by_time, faults)
+        columns = columns_of(self.problem, self.solution.state, self.solution.evaluation.pixels.jacobian, faults)
         m = self.root.size
         columns[: 2 * m] *= np.repeat(self.root, 2)[:, None]
         return np.concatenate([columns, np.zeros((self.residual.size - len(columns), columns.shape[1]))])
@@ -128,23 +142,11 @@ def _linear(problem: Problem, solution: Solution, noise: float) -> _Linear:
     cells = (np.concatenate(values), (np.concatenate(lines), np.concatenate(places)))
     jacobian = csr_array(cells, shape=(start, size))
     inverted = inverse((jacobian.T @ jacobian).toarray(), partly=True)
-    by_time = np.where(used[:, None], pixels.jacobian[:, :, CLOCK_COLUMN], 0.0)
     spare = max(2.0 * float(used.sum()) - size, 1.0)
-    return _Linear(problem, solution, np.concatenate(residuals), jacobian, inverted, root, by_time, spare, noise**-2.0)
+    return _Linear(problem, solution, np.concatenate(residuals), jacobian, inverted, root, spare, noise**-2.0)
 
 
-@dataclass(frozen=True, eq=False)
-class _Trial:
-    """A fault with the logarithm of its ratio of likelihoods, how rare it is, and the step of its size."""
-
-    fault: Fault
-    evidence: float
-    rare: float
-    step: Array
-    covariance: Array
-
-
-def _tried(linear: _Linear, faults: Sequence[Fault], count: int = 0) -> list[_Trial]:
+def _tried(linear: _Linear, faults: Sequence[Fault], count: int = 0) -> list[Trial]:
     """Each fault by itself.
 
     Parameters
@@ -156,7 +158,7 @@ def _tried(linear: _Linear, faults: Sequence[Fault], count: int = 0) -> list[_Tr
     through = linear.own @ across
     slope = -(columns.T @ linear.residual - through.T @ (linear.jacobian.T @ linear.residual))
     squares = float((linear.residual[:m2] ** 2).sum())
-    found, place = list[_Trial](), 0
+    found, place = list[Trial](), 0
     for fault in faults:
         own = slice(place, place + fault.value.size)
         place = own.stop
@@ -171,7 +173,7 @@ def _tried(linear: _Linear, faults: Sequence[Fault], count: int = 0) -> list[_Tr
         wide = np.linalg.slogdet(np.eye(fault.value.size) + sigma**2 * told)[1]
         rare = rarity(fault) + float(np.log(count or len(faults)))
         evidence = 0.5 * float(asked @ step) - 0.5 * float(wide) - rare
-        found.append(_Trial(fault, evidence, rare, step, covariance))
+        found.append(Trial(fault, evidence, rare, step, covariance))
     return found
 
 
@@ -189,15 +191,17 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
     ----------
     found : the fit as everything was given.
     """
-    faults, otherwise = list[Fault](), list[Unknowns]()
+    faults, otherwise, unseen = list[Fault](), list[Solution](), list[Trial]()
     for _ in range(MOST):
         linear = _linear(found.problem, found.solution, found.noise)
         stated = _as_stated(found, loss)
-        ahead = list[_Trial]()
+        ahead = list[Trial]()
         for group in candidates(found.problem, found.solution.state):
             on_ground = group[0].kind == "ground" and stated is not found
             about = _linear(stated.problem, stated.solution, stated.noise) if on_ground else linear
-            best = max(_tried(about, group), key=lambda one: one.evidence)
+            trials = _tried(about, group)
+            unseen = trials if group[0].kind == "ground" else unseen
+            best = max(trials, key=lambda one: one.evidence)
             if best.fault.kind == "gap":
                 near = [g for g in gaps(found.problem, best.fault.view, best.fault.at) if g.picks == best.fault.picks]
                 best = max(_tried(linear, near, len(group)), key=lambda one: one.evidence)
@@ -212,12 +216,15 @@ def mend(found: Found, loss: Loss, progress: Progress = silent) -> Mended:
             break
         fault, mended, in_doubt = made
         faults.append(fault)
-        if fault.kind == "rate" or fault.doubtful:
-            return Mended(found, tuple(faults), (*otherwise, mended.solution.state))
+        if fault.kind in ("rate", "drag") or fault.doubtful:
+            otherwise.append(mended.solution)
+            break
         if in_doubt:
-            otherwise.append(found.solution.state)
+            otherwise.append(found.solution)
         found = mended
-    return Mended(found, tuple(faults), tuple(otherwise))
+    known = {fault.at for fault in faults if fault.kind == "ground"}
+    unseen = [one for one in unseen if one.evidence < ASKED_FOR and one.fault.at not in known]
+    return Mended(found, tuple(faults), tuple(otherwise), tuple(unseen))
 
 
 def _is_as_stated(problem: Problem) -> bool:
@@ -235,7 +242,7 @@ def _as_stated(found: Found, loss: Loss) -> Found:
     return replace(found, problem=problem, solution=solve(problem, found.solution.state, loss))
 
 
-def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault, Found, bool] | None:
+def _without(found: Found, at: Found, trial: Trial, loss: Loss) -> tuple[Fault, Found, bool] | None:
     """The fit without a fault; None where the squares do not fall by as much as they should.
 
     Parameters
@@ -246,8 +253,12 @@ def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault,
     fault, step, state, problem = trial.fault, trial.step, before.state, base
     for _ in range(ROUNDS):
         fault = replace(fault, value=fault.value + step)
+        if not can_be(fault):
+            return None
         _, moved_state = applied(problem, state, fault, step)
         problem, _ = applied(base, before.state, fault, fault.value)
+        if not evaluate(problem, moved_state).valid:
+            return None
         solution = solve(problem, moved_state, loss)
         state = solution.state
         (again,) = _tried(_linear(problem, solution, found.noise), [fault])
@@ -263,7 +274,7 @@ def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault,
                 continue
         if (np.abs(step) < SETTLED * sigma).all():
             break
-    if not solution.evaluation.valid or (fault.kind == "rate" and abs(float(fault.value[0])) < LEAST_RATE):
+    if fault.kind == "rate" and abs(float(fault.value[0])) < LEAST_RATE:
         return None
     variance = max(_scatter(solution), found.noise**-2.0) * _alike(problem, solution)
     gain = (objective(before, loss) - objective(solution, loss)) / variance
@@ -279,8 +290,10 @@ def _without(found: Found, at: Found, trial: _Trial, loss: Loss) -> tuple[Fault,
         gain += 0.5 * (_log_det(again.covariance) - 2 * fault.value.size * float(np.log(prior)))
     gain -= trial.rare
     rival = find_accelerations(found.problem, found.solution, found.noise)
-    against = 0.0 if rival is None else rival.gain - trial.rare  # accelerations are not taken for rare
-    if gain < max(ASKED_FOR, against * (BESIDE if fault.kind == "zoom" else 1.0)):
+    against = (
+        0.0 if rival is None or not rival.asked else rival.gain - trial.rare
+    )  # accelerations are not taken for rare
+    if gain < max(ASKED_FOR, against * (BESIDE if fault.kind in ("zoom", "drag", "rate") else 1.0)):
         return None
     fault = replace(fault, doubtful=gain < against)
     unscaled = replace(problem, sigma_px=problem.sigma_px / found.noise, ground=problem.ground.scaled(1.0, 1.0))
@@ -335,6 +348,25 @@ def _jump(problem: Problem, solution: Solution, fault: Fault) -> float:
     before, after = (np.minimum(each, REJECTED**2) for each in squares)
     split = int(np.argmin(np.cumsum(before - after)[:-1]))
     return float(problem.video_s[rows[split]])
+
+
+def _moved_by(linear: _Linear, covariance: Array, faults: Sequence[Fault]) -> Array:
+    """(size, c) by how much the unknowns move with each number of faults."""
+    across = np.asarray(linear.jacobian.T @ linear.columns(faults))
+    return np.asarray(-covariance @ across[: len(covariance)])
+
+
+def unseen_ground(
+    problem: Problem, solution: Solution, covariance: Array, unseen: Sequence[Trial]
+) -> tuple[Array, Array]:
+    """What the ground at single contacts may be off by without being noticed, four times in five (c,) [m], and by how
+    much the unknowns move with a metre of it (size, c): Baarda's internal and external reliability (1968)."""
+    told = np.array([1 / one.covariance[0, 0] for one in unseen]) - np.array(
+        [prior_sigma(problem, one.fault) ** -2 for one in unseen]
+    )
+    asked = np.sqrt(2 * (ASKED_FOR + np.array([one.rare for one in unseen])))
+    least = (asked + POWER) / np.sqrt(np.maximum(told, 1e-12))
+    return least, _moved_by(_linear(problem, solution, 1.0), covariance, [one.fault for one in unseen])
 
 
 def spread_of_faults(problem: Problem, solution: Solution, covariance: Array, faults: Sequence[Fault]) -> Array:

@@ -15,8 +15,9 @@ from .views import View
 
 NODE = 4
 """Unknowns of a node: x, y, z of the block's centre [m] and the time [s]."""
-LAW_COLUMN, POSE_COLUMNS, CLOCK_COLUMN = 9, slice(10, 16), 16
-"""Of the pixels' derivatives: by gravity, the view's pose and its clock's offset, there even when these are held."""
+DRAG_COLUMN, LAW_COLUMN, POSE_COLUMNS, CLOCK_COLUMN = 8, 9, slice(10, 16), 16
+"""Of the pixels' derivatives: by the drag coefficient, gravity, the view's pose and its clock's offset, there even when
+these are held."""
 SHORTEST_S = 1e-4
 """A segment does not become shorter than this."""
 

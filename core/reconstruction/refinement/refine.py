@@ -150,7 +150,7 @@ def _solve(setup: Setup, alone: Callable[[str], Setup], loss: Loss, free: frozen
     else:
         found = search(setup, state, loss, progress)
     mended = mend(found, loss, progress)
-    if mended.faults:
+    if mended.found is not found:
         found = replace(mended.found, rivals=())
     return with_covariance(
         replace(setup, problem=found.problem, noise=found.noise), found.solution, [*rivals, *found.rivals], mended

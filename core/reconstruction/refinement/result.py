@@ -119,7 +119,7 @@ def summarise(
     return Refinement(
         picks=picks,
         reconstruction=made,
-        views=_refined_views(views, fits[0], posed="camera" in free),
+        views=_refined_views(views, fits[0], posed="camera" in free, alone=len(fits) == 1),
         residual_px=residual,
         outlier=outlier,
         rmse_px_before=_rms(before),
@@ -233,14 +233,14 @@ def _with_sigmas(
     return replace(made, impacts=replace(impacts, sigma=sigma, intervals=intervals))
 
 
-def _refined_views(views: tuple[View, ...], fit: Fit, *, posed: bool) -> tuple[View, ...]:
+def _refined_views(views: tuple[View, ...], fit: Fit, *, posed: bool, alone: bool) -> tuple[View, ...]:
     """All shared unknowns are in the first problem, which is then the only one."""
     state, columns = fit.solution.state, fit.setup.problem.columns
     refined = []
     for i, view in enumerate(views):
         path, pose = view.path, columns.pose[i]
         clock = replace(
-            fit.setup.problem.views[i].clock,
+            fit.setup.problem.views[i].clock if alone else view.clock,
             offset_s=view.clock.offset_s + float(state.offset_s[i]),
             drift=view.clock.drift + float(state.drift[i]),
         )

@@ -68,7 +68,8 @@ def solve_with_noise(problem: Problem, state: Unknowns, loss: Loss, progress: Pr
     if noise > 1:
         problem = replace(problem, sigma_px=noise * problem.sigma_px)
         solution = solve(problem, solution.state, loss, progress)
-    if find_accelerations(problem, solution, noise) is not None:
+    pushed = find_accelerations(problem, solution, noise)
+    if pushed is not None and pushed.asked:
         return Found(problem, solution, noise)  # what the flights are off by is not the terrain's
     contact, terrain = terrain_scales(problem, solution)
     if max(abs(np.log(contact)), abs(np.log(terrain))) > SAME_SCALE:

@@ -12,6 +12,7 @@ from ...vectors import Array, Indices, cross, dot, norm, unit
 from ..drag import Drag
 from ..impact import Impacts
 from ..node_motion import NodeMotion
+from .accelerations import LIFT
 from .deviations import Fit
 from .problem import Problem, Unknowns, common_times, evaluate, moved
 from .setup import SHAPE
@@ -19,8 +20,6 @@ from .solver import Solution, normal_equations
 
 CAMERA_M, READOUT_S, DIAMETER = 0.3, 0.02, 0.2
 """By how much they are changed: the camera's place, the rolling shutter, the block's diameter as a part of it."""
-LIFT = 0.35
-"""Coefficient of lift of a ball whose surface turns about as fast as it flies, as one that rolls (Nathan 2008)."""
 STATED = "stated deviation"
 """What the rows are about that hold the standard deviations of the impacts, to compare the others with."""
 WITH_DRAG = "With air drag"

@@ -120,7 +120,7 @@ def test_cameras_pairs_and_clocks_are_identical(opened, part, old) -> None:
             same(plain(getattr(path, name)), before[name], where=name)
         same(plain(path.reference.intrinsics), before["intrinsics"])
         same(plain(camera_paths.pose_covariance(camera)), before["pose_covariance"])
-        same(plain(clocks.clock_of(camera)), before["clock"])
+        same(plain(clocks.clock_of(camera)), before["clock"] | {"gaps": []})  # which 0.1.0 did not have
         same(plain(videos.times_of(camera)[:5]), before["video_s"])
         assert len(videos.times_of(camera)) == before["frames"]
         assert (videos.row_time_of(camera) or 0.0) == before["row_time_s"]

@@ -65,8 +65,8 @@ def test_events_synchronise(part: Part, fit_drift: bool) -> None:
 
 def test_frames_that_are_missing_stay_so(part: Part) -> None:
     """A gap that a refinement found: the clock jumps there, also when it is synchronised or its rate is told."""
-    videos, clocks = part("rockfall_addon.scene.videos"), part("rockfall_addon.scene.clocks")
-    times = part("rockfall_addon.scene.video_times")
+    videos, clocks = part("rockfall_addon.scene.footage.videos"), part("rockfall_addon.scene.footage.clocks")
+    times = part("rockfall_addon.scene.footage.video_times")
     reference, other = (add(part, "slower.mp4") for _ in range(2))
     shown = videos.times_of(other)
     gap = (float(shown[60]), 0.2)

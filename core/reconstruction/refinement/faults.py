@@ -31,6 +31,8 @@ LIMITS = {"gap": (-10.0, 10.0), "ground": (-10.0, 10.0), "zoom": (-0.5, 0.5), "r
 """Sizes between which a fault can be one."""
 RARE = {"gap": 100.0, "ground": 10.0, "zoom": 100.0, "rate": 100.0, "drag": 2.0}
 """One fit of so many has a fault of a kind: blocks dig into the ground, videos are cut less often."""
+NEAR_FRAMES = 1.5
+"""A jump that is nearer to a contact is no gap: a contact that lasts, or was two, looks alike and is more frequent."""
 NEARLY_ONE = 0.7
 """Frames that are missing, from which they are counted."""
 FEWEST_CONTACTS = 2
@@ -211,6 +213,16 @@ def columns_of(problem: Problem, state: Unknowns, jacobian: Array, faults: Seque
             away = -_from_middle(problem, fault.view) / problem.sigma_px[:, None]
             own[: 2 * m] = (away[:, :, None] * _spline(problem.video_s, fault.knots_s)[:, None, :]).reshape(2 * m, -1)
     return columns
+
+
+def at_contact(problem: Problem, state: Unknowns, fault: Fault) -> bool:
+    """Whether a gap lies at a contact: one that lasts, or was two, looks alike."""
+    if fault.kind != "gap":
+        return False
+    clock = problem.views[fault.view].clock
+    middle = clock.to_common(fault.at) + clock.speed * frame_s(problem, fault.view) / 2 + state.offset_s[fault.view]
+    away = np.abs(state.time_s - middle).min() / (clock.speed * frame_s(problem, fault.view))
+    return bool(away < NEAR_FRAMES)
 
 
 def can_be(fault: Fault) -> bool:

@@ -19,7 +19,7 @@ from ...vectors import Array, Indices
 from ..choices import Loss
 from .accelerations import find_accelerations
 from .correlation import track_noise
-from .faults import Fault, applied, can_be, candidates, columns_of, gaps, prior_sigma, rarity
+from .faults import Fault, applied, at_contact, can_be, candidates, columns_of, gaps, prior_sigma, rarity
 from .problem import CLOCK_COLUMN, NODE, POSE_COLUMNS, Problem, Rows, Unknowns, evaluate, ground_distances
 from .search import Found, solve_with_noise
 from .solver import HUBER, REJECTED, Solution, objective, solve
@@ -274,6 +274,8 @@ def _without(found: Found, at: Found, trial: Trial, loss: Loss) -> tuple[Fault, 
                 continue
         if (np.abs(step) < SETTLED * sigma).all():
             break
+    if at_contact(problem, state, fault):
+        return None
     if fault.kind == "rate" and abs(float(fault.value[0])) < LEAST_RATE:
         return None
     variance = max(_scatter(solution), found.noise**-2.0) * _alike(problem, solution)

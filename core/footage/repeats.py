@@ -17,6 +17,9 @@ AROUND = 5
 """Pairs on either side with which one is compared: 12 pictures a second stored as 60 repeat four times."""
 UNLIKE, LIKE = 0.2, 0.5
 """A repeated picture changes by less than this part of what its neighbours do; and one in the rhythm of others."""
+AT_ONCE = 0.65
+"""The pictures before and after a repeated one change by more than this part of what is usual there. A camera that
+turns back, held by hand, slows down first."""
 LEAST_CHANGE = 10.0
 """Grey levels: the coding of a still picture changes by less."""
 QUIET = 0.6
@@ -98,6 +101,7 @@ def repeated_pictures(changes: Changes) -> Indices:
     moving[0] = False
     part = np.where(moving, strongest / np.maximum(level, LEAST_CHANGE), np.nan)
     found = calm & (part < UNLIKE)
+    found &= _beside(strongest, found) > AT_ONCE * level
     found |= (in_step := _in_rhythm(part)) & (part < LIKE)
     if in_step.any():  # also where the film begins or ends, with pictures on one side alone
         ends = _lower_of_sides(strongest, np.inf)
@@ -107,6 +111,14 @@ def repeated_pictures(changes: Changes) -> Indices:
     if found.sum() > MOST_OF_A_FILM * max(int(moving.sum()), 1):
         return np.empty(0, np.intp)
     return np.flatnonzero(found)
+
+
+def _beside(strongest: Array, found: Mask) -> Array:
+    """(p,) the smaller change of the nearest pictures on both sides that are not found."""
+    others = np.flatnonzero(~found)
+    after = np.clip(np.searchsorted(others, np.arange(found.size), side="right"), 0, others.size - 1)
+    before = np.clip(np.searchsorted(others, np.arange(found.size)) - 1, 0, others.size - 1)
+    return np.minimum(strongest[others[before]], strongest[others[after]])
 
 
 def rhythm(repeated: Indices) -> tuple[int, int]:

@@ -82,6 +82,8 @@ def test_other_films_without_repeats(name: str) -> None:
 def test_the_demos_footage_repeats_nothing() -> None:
     """A camera that is held by hand, compressed: at a quarter, the middle and three quarters of it."""
     assert repeats_at_a_glance(open_video(ASSETS / "demo" / "footage" / "footage.mp4")) == ""
+    whole = open_video(ASSETS / "demo" / "footage" / "footage.mp4", thorough=True)
+    assert whole.repeated.size == 0, "where a hand turns back, the camera nearly stands still"
     assert "every 5th: about 24" in repeats_at_a_glance(open_video(FIELD / "dup23.mp4"))
 
 

@@ -42,7 +42,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ground = make_ground(surface)
     place = placed_on(ground, np.column_stack([np.full(RUNS, 6.0), 20.0 + 15 * np.arange(RUNS)]), np.full(RUNS, 0.5))
     releases = make_releases(place, velocity=np.tile([4.0, 0.0, 2.0], (RUNS, 1)), diameter_m=0.5)
-    run = simulate(ground, releases, Settings(MODEL, TRUTH, seed=11))
+    run = simulate(ground, releases, Settings(MODEL, TRUTH, seed=14))
     records = run.records
     picks, stops = ["trajectory,time_s,x_m,y_m,z_m,kind"], ["release,x_m,y_m"]
     for block in range(RUNS):

@@ -50,4 +50,4 @@ def test_rn_with_a_free_pitch(ball: Ball) -> None:
     assert 3 < pitch_deg(found) < 8
     # Nothing told it that the bench is level.
     assert found.picks.position[2, 2] == pytest.approx(found.picks.position[1, 2], abs=0.02)
-    assert (found.reconstruction.impacts.sigma["rn"] < 0.03).all()
+    assert (found.reconstruction.impacts.sigma["rn"] < 0.035).all()

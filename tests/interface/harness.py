@@ -199,7 +199,9 @@ def load_case(file: str, name: str) -> Iterator[float]:
 def is_preparing() -> bool:
     """Whether models are compiled in the background, which takes long in a Blender that never ran them."""
     scene = f"{EXTENSION}.rockfall_addon.scene"
-    preparation, models = (importlib.import_module(f"{scene}.{name}") for name in ("preparation", "models"))
+    preparation, models = (
+        importlib.import_module(f"{scene}.{name}") for name in ("picks.preparation", "models.models")
+    )
     return bool(preparation.pending(models.ORDER))
 
 

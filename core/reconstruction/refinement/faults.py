@@ -108,9 +108,9 @@ def applied(problem: Problem, state: Unknowns, fault: Fault, value: Array) -> tu
         contact[int(fault.at)] = np.hypot(contact[int(fault.at)], SIGMA_GONE_M)
         return replace(problem, ground=problem.ground.with_contact(contact)), state
     if fault.kind == "zoom":
-        larger = _spline(problem.video_s, fault.knots_s) @ value
+        larger = np.where(problem.view == fault.view, _spline(problem.video_s, fault.knots_s) @ value, 0.0)
         pixel = problem.pixel - _from_middle(problem, fault.view) * (larger / (1 + larger))[:, None]
-        return replace(problem, pixel=pixel), state
+        return replace(problem, pixel=pixel, sigma_px=problem.sigma_px / (1 + larger)), state  # their noise with them
     if fault.kind == "drag":
         return problem, replace(state, coefficient=state.coefficient + size)
     middle = float(state.time_s.mean())

@@ -273,9 +273,9 @@ def _unseen_ground(fit: Fit) -> Iterator[Remark]:
         change.append(np.einsum("ki,kic->kc", unit(velocity), slope) / norm(velocity)[:, None])
     most = GONE_M * np.abs(np.concatenate(change)).max(axis=0)
     text = (
-        f"{_who(fit.setup)}: these views do not test the ground at a single contact: what it is off by passes unseen "
-        f"below about {float(np.median(least)):.1f} m, and {GONE_M:g} m would change a speed beside it by "
-        f"{100 * float(np.median(most)):.1f} %. A second side does."
+        f"{_who(fit.setup)}: these views do not test the ground at a single contact. An error there is not detectable "
+        f"below about {float(np.median(least)):.1f} m; {GONE_M:g} m would change a speed next to it by "
+        f"{100 * float(np.median(most)):.1f} %. A view from another side detects it."
     )
     yield Remark(text, "note", fit.setup.names[0] if len(fit.setup.names) == 1 else "")
 

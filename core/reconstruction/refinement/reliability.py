@@ -146,8 +146,8 @@ def on_statements(rows: Sequence[Statement]) -> Iterator[Remark]:
         row = max(unseen, key=lambda one: one.most_speed_percent)
         error = row.error[0].lower() + row.error[1:]
         text = (
-            f"An error of what is stated is not detectable below {row.noticed:.2g} m ({error}): it would change a speed "
-            f"by {row.cells[3]}, more than its interval."
+            f"An error of what is stated is not detectable below {row.noticed:.2g} m ({error}): it would change a "
+            f"speed by {row.cells[3]}, more than its interval."
         )
         yield Remark(text, "note", "reliability")
 

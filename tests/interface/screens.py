@@ -60,7 +60,7 @@ def case_screen_across_the_slope(window):
     screen.rockfall_screen.height_m = 4.0
     with window.override():
         bpy.ops.rockfall.simulate("INVOKE_DEFAULT")
-    job, setup = (window.part(f"rockfall_addon.{name}") for name in ("view.job", "scene.simulation_setup"))
+    job, setup = (window.part(f"rockfall_addon.{name}") for name in ("view.job", "scene.simulation.simulation_setup"))
     yield from window.wait_for(lambda: setup.screen_results(scene) and not job.is_running(), 240, "simulated")
     (found,) = setup.screen_results(scene)
     assert 0 < found["reach"] <= found["blocks"]

@@ -221,8 +221,9 @@ def at_contact(problem: Problem, state: Unknowns, fault: Fault) -> bool:
         return False
     clock = problem.views[fault.view].clock
     middle = clock.to_common(fault.at) + clock.speed * frame_s(problem, fault.view) / 2 + state.offset_s[fault.view]
-    away = np.abs(state.time_s - middle).min() / (clock.speed * frame_s(problem, fault.view))
-    return bool(away < NEAR_FRAMES)
+    between = np.intersect1d(problem.first, problem.last)  # where a run begins or ends there is nothing to mistake
+    away = np.abs(state.time_s[between] - middle) / (clock.speed * frame_s(problem, fault.view))
+    return bool((away < NEAR_FRAMES).any())
 
 
 def can_be(fault: Fault) -> bool:

@@ -79,10 +79,12 @@ def find_accelerations(problem: Problem, solution: Solution, noise: float) -> Ac
     drawn = -own @ information[:size, size:]
     wanted = information[size:, size:] + information[size:, :size] @ drawn
     slope = gradient[size:] + drawn.T @ gradient[:size]
-    told, axes = np.linalg.eigh((wanted + wanted.T) / 2)
-    told = np.maximum(told, 0.0)
+    curvature, axes = np.linalg.eigh((wanted + wanted.T) / 2)
+    curvature = np.maximum(curvature, 0.0)
 
-    shift = -np.linalg.lstsq(wanted + 1e-9 * np.trace(wanted) / told.size * np.eye(told.size), slope, rcond=None)[0]
+    shift = -np.linalg.lstsq(
+        wanted + 1e-9 * np.trace(wanted) / curvature.size * np.eye(curvature.size), slope, rcond=None
+    )[0]
     step = np.concatenate([drawn @ shift - own @ gradient[:size], shift])
     left = replace(pixels, residual=pixels.residual + _times(pixels, step))
     after = replace(solution, evaluation=replace(evaluation, pixels=left))
@@ -94,15 +96,15 @@ def find_accelerations(problem: Problem, solution: Solution, noise: float) -> Ac
     alike = [track.larger**2 * (1 + track.correlation) / (1 - track.correlation) for track in tracks]
     variance *= max(1.0, float(np.mean(alike))) if alike else 1.0
 
-    told, slope = told / variance, axes.T @ slope / variance
-    gain = _gains(told, slope, SIZES_MPS2)
+    curvature, slope = curvature / variance, axes.T @ slope / variance
+    gain = _gains(curvature, slope, SIZES_MPS2)
     best = int(np.argmax(gain))
     asked = bool(gain[best] >= ASKED_FOR)
     if asked:
-        mean, spread = _in_each_flight(axes @ (told[:, None] * axes.T), axes @ slope, float(SIZES_MPS2[best]))
+        mean, spread = _in_each_flight(axes @ (curvature[:, None] * axes.T), axes @ slope, float(SIZES_MPS2[best]))
     else:
-        mean, spread = np.zeros(told.size), _too_small_to_tell(axes, told, slope, _in_air(problem, solution))
-    through = np.concatenate([drawn, np.eye(told.size)])
+        mean, spread = np.zeros(curvature.size), _too_small_to_tell(axes, curvature, slope, _in_air(problem, solution))
+    through = np.concatenate([drawn, np.eye(curvature.size)])
     found = np.zeros((len(problem.first), 3))
     found[flying] = mean.reshape(-1, 3)
     kept = tuple(replace(track, columns=track.columns[track.columns < size]) for track in tracks)
@@ -118,7 +120,7 @@ def find_accelerations(problem: Problem, solution: Solution, noise: float) -> Ac
     )
 
 
-def _in_each_flight(told: Array, slope: Array, size: float) -> tuple[Array, Array]:
+def _in_each_flight(curvature: Array, slope: Array, size: float) -> tuple[Array, Array]:
     """The accelerations (3k,) that are there, and the covariance of their errors about none.
 
     One size holds for all flights in the mean, but single ones may have much more (drag of the fastest, another spin):
@@ -126,21 +128,23 @@ def _in_each_flight(told: Array, slope: Array, size: float) -> tuple[Array, Arra
 
     Parameters
     ----------
-    told, slope : (3k, 3k), (3k,) information and gradient of half the squares.
+    curvature, slope : (3k, 3k), (3k,) Hessian and gradient of half the squares.
     """
     flights, weight = slope.size // 3, np.ones(slope.size // 3)
     for _ in range(REWEIGHTED):
-        covariance = np.linalg.inv(told + np.diag(np.repeat(weight, 3)) / size**2)
+        covariance = np.linalg.inv(curvature + np.diag(np.repeat(weight, 3)) / size**2)
         mean = -covariance @ slope
         square = (mean**2 + np.diag(covariance)).reshape(flights, 3).sum(axis=1) / size**2
         weight = (FREEDOM + 3) / (FREEDOM + square)
     return mean, covariance + np.outer(mean, mean)
 
 
-def _gains(told: Array, slope: Array, sizes_mps2: Array) -> Array:
+def _gains(curvature: Array, slope: Array, sizes_mps2: Array) -> Array:
     """(s,) logarithm of the ratio of likelihoods with accelerations of s sizes and without."""
     size_2 = sizes_mps2[:, None] ** 2
-    return np.asarray((0.5 * size_2 * slope**2 / (1 + size_2 * told) - 0.5 * np.log1p(size_2 * told)).sum(axis=1))
+    return np.asarray(
+        (0.5 * size_2 * slope**2 / (1 + size_2 * curvature) - 0.5 * np.log1p(size_2 * curvature)).sum(axis=1)
+    )
 
 
 def _in_air(problem: Problem, solution: Solution) -> float:
@@ -150,17 +154,17 @@ def _in_air(problem: Problem, solution: Solution) -> float:
     return float(np.sqrt((lift**2).mean()))
 
 
-def _too_small_to_tell(axes: Array, told: Array, slope: Array, greatest_mps2: float) -> Array:
+def _too_small_to_tell(axes: Array, curvature: Array, slope: Array, greatest_mps2: float) -> Array:
     """(3k, 3k) covariance of accelerations about none that the pixels do not ask for, but do not rule out either.
 
     There are none, or some of a part of the greatest, each as much as it is likely.
     """
     sizes = greatest_mps2 * UNSEEN_PARTS
-    weight = np.exp(np.minimum(_gains(told, slope, sizes), ASKED_FOR)) / sizes.size
+    weight = np.exp(np.minimum(_gains(curvature, slope, sizes), ASKED_FOR)) / sizes.size
     weight /= 1 + weight.sum()
     spread = np.zeros_like(axes)
     for part, size_2 in zip(weight, sizes**2, strict=True):
-        narrow = size_2 / (1 + size_2 * told)
+        narrow = size_2 / (1 + size_2 * curvature)
         mean = axes @ (narrow * slope)
         spread += part * ((axes * narrow) @ axes.T + np.outer(mean, mean))
     return spread

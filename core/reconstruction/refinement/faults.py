@@ -201,9 +201,8 @@ def columns_of(problem: Problem, state: Unknowns, jacobian: Array, faults: Seque
             if fault.picks:
                 own[2 * m : 2 * m + n, 0] = weight * _later_nodes(problem, state, fault)
         elif fault.kind == "drag":
-            slightly = replace(
-                state, coefficient=max(state.coefficient, LEAST_DRAG)
-            )  # without it they are not computed
+            # without drag its derivatives are not computed
+            slightly = replace(state, coefficient=max(state.coefficient, LEAST_DRAG))
             own[: 2 * m, 0] = evaluate(problem, slightly).pixels.jacobian[:, :, DRAG_COLUMN].ravel()
         elif fault.kind == "rate":
             middle = float(state.time_s.mean())

@@ -162,15 +162,15 @@ def _tried(linear: _Linear, faults: Sequence[Fault], count: int = 0) -> list[Tri
     for fault in faults:
         own = slice(place, place + fault.value.size)
         place = own.stop
-        told = columns[:, own].T @ columns[:, own] - across[:, own].T @ through[:, own]
+        information = columns[:, own].T @ columns[:, own] - across[:, own].T @ through[:, own]
         sigma = prior_sigma(linear.problem, fault)
         known = np.eye(fault.value.size) / sigma**2
-        gain = float(slope[own] @ np.linalg.solve(told + known, slope[own]))
+        gain = float(slope[own] @ np.linalg.solve(information + known, slope[own]))
         variance = max((squares - gain) / linear.spare, linear.floor)
-        told, asked = told / variance, slope[own] / variance - known @ fault.value
-        covariance = np.linalg.inv(told + known)
+        information, asked = information / variance, slope[own] / variance - known @ fault.value
+        covariance = np.linalg.inv(information + known)
         step = covariance @ asked
-        wide = np.linalg.slogdet(np.eye(fault.value.size) + sigma**2 * told)[1]
+        wide = np.linalg.slogdet(np.eye(fault.value.size) + sigma**2 * information)[1]
         rare = rarity(fault) + float(np.log(count or len(faults)))
         evidence = 0.5 * float(asked @ step) - 0.5 * float(wide) - rare
         found.append(Trial(fault, evidence, rare, step, covariance))
@@ -292,9 +292,8 @@ def _without(found: Found, at: Found, trial: Trial, loss: Loss) -> tuple[Fault, 
         gain += 0.5 * (_log_det(again.covariance) - 2 * fault.value.size * float(np.log(prior)))
     gain -= trial.rare
     rival = find_accelerations(found.problem, found.solution, found.noise)
-    against = (
-        0.0 if rival is None or not rival.asked else rival.gain - trial.rare
-    )  # accelerations are not taken for rare
+    # a fault is rare, an acceleration is not
+    against = 0.0 if rival is None or not rival.asked else rival.gain - trial.rare
     if gain < max(ASKED_FOR, against * (BESIDE if fault.kind in ("zoom", "drag", "rate") else 1.0)):
         return None
     fault = replace(fault, doubtful=gain < against)
@@ -363,11 +362,11 @@ def unseen_ground(
 ) -> tuple[Array, Array]:
     """What the ground at single contacts may be off by without being noticed, four times in five (c,) [m], and by how
     much the unknowns move with a metre of it (size, c): Baarda's internal and external reliability (1968)."""
-    told = np.array([1 / one.covariance[0, 0] for one in unseen]) - np.array(
+    information = np.array([1 / one.covariance[0, 0] for one in unseen]) - np.array(
         [prior_sigma(problem, one.fault) ** -2 for one in unseen]
     )
     asked = np.sqrt(2 * (ASKED_FOR + np.array([one.rare for one in unseen])))
-    least = (asked + POWER) / np.sqrt(np.maximum(told, 1e-12))
+    least = (asked + POWER) / np.sqrt(np.maximum(information, 1e-12))
     return least, _moved_by(_linear(problem, solution, 1.0), covariance, [one.fault for one in unseen])
 
 

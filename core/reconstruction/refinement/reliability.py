@@ -23,7 +23,7 @@ from .what_if import flights_at_impacts
 SIGNIFICANCE, POWER = 0.001, 0.8
 """Chance that a test of what is right rejects it, and that one notices an error of the size that is said."""
 MOST_PERCENT = 20.0
-"""What an error does to a speed is told by derivatives: not beyond this."""
+"""The effect of an error on a speed is computed from derivatives, which hold up to about this."""
 CAMERA, TERRAIN, CONTACT, TIME, PLACE = "camera of", "terrain", "contact", "time", "place"
 OPPOSITE = {
     "higher": "lower",
@@ -136,9 +136,9 @@ def on_statements(rows: Sequence[Statement]) -> Iterator[Remark]:
     if grave:
         row = max(grave, key=lambda one: abs(one.w) / one.critical)
         text = (
-            f"{row.asked} by {abs(row.found):.2g} ± {row.sigma:.1g} {row.unit} than is stated, by the pixels of "
-            f"trajectory {row.trajectory}: {abs(row.w):.1f} standard deviations of what was stated and of what they "
-            f"tell. {CHECK[row.about.split()[0]]}"
+            f"The pixels of trajectory {row.trajectory} contradict what is stated: "
+            f"{row.asked[0].lower()}{row.asked[1:]} by {abs(row.found):.2g} ± {row.sigma:.1g} {row.unit} "
+            f"({abs(row.w):.1f} standard deviations). {CHECK[row.about.split()[0]]}"
         )
         yield Remark(text, "warning", row.about)
     unseen = [row for row in rows if row.about not in (CONTACT, TIME, PLACE) and row.intervals > 1]
@@ -162,8 +162,8 @@ def _of_fit(fit: Fit) -> Iterator[Statement]:
     before, after = flights_at_impacts(fit)
     if not here.valid or not before.size:
         return
-    information, gradient = normal_equations(problem, here, solution.weight)
-    covariance = inverse(information, partly=True)
+    normal, gradient = normal_equations(problem, here, solution.weight)
+    covariance = inverse(normal, partly=True)
     ends = [
         (velocity_rows(problem, here.motion, before, at_end=True), here.motion.end_velocity, before),
         (velocity_rows(problem, here.motion, after, at_end=False), here.motion.start_velocity, after),
@@ -174,10 +174,10 @@ def _of_fit(fit: Fit) -> Iterator[Statement]:
     scale = fit.scale * float(np.sqrt(max(wider, 1.0)))
     for errors in _errors(fit, problem):
         moved = errors.mixed @ covariance  # (q, size) what the unknowns follow each error by, with the other sign
-        told = errors.curvature - np.einsum("qi,qi->q", moved, errors.mixed)
-        told = np.maximum(told, 1e-12 * errors.curvature)
-        sigma = scale / np.sqrt(told)
-        found = -(errors.slope - moved @ gradient) / told
+        information = errors.curvature - np.einsum("qi,qi->q", moved, errors.mixed)
+        information = np.maximum(information, 1e-12 * errors.curvature)
+        sigma = scale / np.sqrt(information)
+        found = -(errors.slope - moved @ gradient) / information
         percent = np.concatenate(
             [
                 100 * np.einsum("kij,qj,ki->qk", rows, moved, unit(velocity[which])) / norm(velocity[which])
@@ -262,24 +262,24 @@ def _errors(fit: Fit, problem: Problem) -> Iterator[_Errors]:
         ):
             yield _Errors(about, words, of, "m", by.T @ residual, (by**2).sum(axis=0), by.T @ jacobian)
 
-    told = np.flatnonzero(setup.picks.sigma_time_s[setup.nodes] > 0)
-    if told.size:
-        weight = problem.sigma_time_s[told] ** -2.0
-        mixed = np.zeros((told.size, size))
-        mixed[np.arange(told.size), NODE * told + 3] = -weight
-        late = (time - problem.time_s)[told]
-        words = [f"Mark of the {called(node)} later" for node in told]
-        yield _Errors([TIME] * told.size, words, owner[told], "s", -weight * late, weight, mixed)
+    marked = np.flatnonzero(setup.picks.sigma_time_s[setup.nodes] > 0)
+    if marked.size:
+        weight = problem.sigma_time_s[marked] ** -2.0
+        mixed = np.zeros((marked.size, size))
+        mixed[np.arange(marked.size), NODE * marked + 3] = -weight
+        late = (time - problem.time_s)[marked]
+        words = [f"Mark of the {called(node)} later" for node in marked]
+        yield _Errors([TIME] * marked.size, words, owner[marked], "s", -weight * late, weight, mixed)
 
-    told = np.flatnonzero(setup.picks.sigma_position_m[setup.nodes] > 0)
-    if told.size:
+    marked = np.flatnonzero(setup.picks.sigma_position_m[setup.nodes] > 0)
+    if marked.size:
         place = problem.views[0].path.reference.position
-        ray = unit(state.centre[told] - place)
-        white = problem.centre_whitening[told]
+        ray = unit(state.centre[marked] - place)
+        white = problem.centre_whitening[marked]
         by = np.einsum("nij,nj->ni", np.swapaxes(white, 1, 2) @ white, ray)
-        mixed = np.zeros((told.size, size))
+        mixed = np.zeros((marked.size, size))
         for axis in range(3):
-            mixed[np.arange(told.size), NODE * told + axis] = -by[:, axis]
-        away, weight = dot((state.centre - problem.centre)[told], by), dot(by, ray)
-        words = [f"Mark of the {called(node)} farther away" for node in told]
-        yield _Errors([PLACE] * told.size, words, owner[told], "m", -away, weight, mixed)
+            mixed[np.arange(marked.size), NODE * marked + axis] = -by[:, axis]
+        away, weight = dot((state.centre - problem.centre)[marked], by), dot(by, ray)
+        words = [f"Mark of the {called(node)} farther away" for node in marked]
+        yield _Errors([PLACE] * marked.size, words, owner[marked], "m", -away, weight, mixed)

@@ -83,7 +83,7 @@ def _draw_proposal(context: bpy.types.Context, layout: bpy.types.UILayout, found
 
 
 def _draw_table(layout: bpy.types.UILayout, head: tuple[str, str, str], rows: tuple[tuple[str, str, str], ...]) -> None:
-    """What would change at most, if an input were otherwise; or what of it would not be noticed."""
+    """The greatest effect of a changed input, or the errors of what is stated that are not detectable."""
     if not rows:
         return
     column = layout.column(align=True)
